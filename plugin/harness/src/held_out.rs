@@ -172,9 +172,10 @@ impl<'a> HeldOut<'a> {
     /// Returns the held-out levels that are seen: by number, as a file, or by their layout.
     ///
     /// All levels of all ranges are compared by their numbers, and those of the first ranges by their layouts, up to
-    /// 262,144 levels. A larger range is named in a warning. If the game has no layouts and [compares states](crate::game::StateTools::compares_levels), the
-    /// first ranges are compared by their play, up to 128 levels with the held-out ones. If all held-out levels play like seen ones, none is left out for that: the
-    /// game has no others. `progress` is that of [`AlikeLevels::of`], and is called only if levels are played.
+    /// 262,144 levels. A larger range is named in a warning. If the game has no layouts and [compares
+    /// states](crate::game::StateTools::compares_levels), the first ranges are compared by their play, up to 128 levels
+    /// with the held-out ones. If all held-out levels play like seen ones, none is left out for that: the game has no
+    /// others. `progress` is that of [`AlikeLevels::of`], and is called only if levels are played.
     pub fn seen_in(&self, seen: &SeenLevels, progress: &(dyn Fn(u64, u64) + Sync)) -> BTreeSet<u64> {
         let mut found = BTreeSet::new();
         if seen.game != self.game.name() || !self.holds {

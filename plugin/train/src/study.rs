@@ -228,6 +228,9 @@ pub struct TestResult {
     /// Different layouts of the levels; `None` if the game does not hash them, and in results of older versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub layouts: Option<u64>,
+    /// Levels that some run of the study knows.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub seen: u64,
     /// Episodes.
     pub episodes: u64,
     /// Share of episodes that reached the level's goal.
@@ -245,10 +248,15 @@ pub struct TestResult {
     pub level_returns: Vec<f64>,
 }
 
+fn is_zero(count: &u64) -> bool {
+    *count == 0
+}
+
 impl From<&EvalSummary> for TestResult {
     fn from(summary: &EvalSummary) -> Self {
         Self {
             layouts: summary.layouts,
+            seen: summary.seen,
             episodes: summary.episodes,
             success: summary.success,
             success_se: summary.success_se,

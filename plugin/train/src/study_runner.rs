@@ -171,6 +171,8 @@ pub struct StudyRunner<'a> {
     last: Option<(RecordingsKey, Dataset)>,
     /// Held-out levels that some run of the study knows. All runs are measured on the others.
     known: BTreeSet<u64>,
+    /// The number of known levels that are measured like new ones, since there are no new ones.
+    measured_known: u64,
 }
 
 /// The folder of a run, locked.
@@ -196,7 +198,7 @@ impl<'a> StudyRunner<'a> {
     /// Makes a runner of runs in `folder`. With `force`, existing runs are replaced instead of resumed.
     pub fn new(games: &'a Games<'a>, folder: &Path, force: bool, setup: TrainingSetup<'a>) -> Self {
         let (learned, checked, last, known) = (BTreeSet::new(), Vec::new(), None, BTreeSet::new());
-        Self { games, folder: folder.into(), force, setup, learned, checked, last, known }
+        Self { games, folder: folder.into(), force, setup, learned, checked, last, known, measured_known: 0 }
     }
 
     /// Brings all runs to their ends, one after the other, and returns the report with their results. `None` if the
@@ -236,7 +238,7 @@ impl<'a> StudyRunner<'a> {
         observer: &mut dyn RunObserver,
     ) -> Result<(), StudyRunError> {
         let mut compared = Vec::new();
-        self.known.clear();
+        (self.known, self.measured_known) = (BTreeSet::new(), 0);
         for run in runs {
             let game = self.games.get(&run.experiment.game)?;
             let seen = self.seen_by(game, run, observer)?;
@@ -253,8 +255,7 @@ impl<'a> StudyRunner<'a> {
             if !is_measured {
                 return Err(StudyRunError::AllSeen(test.clone()));
             }
-            // There are no others to measure apart.
-            self.known.clear();
+            (self.known, self.measured_known) = (BTreeSet::new(), known);
         }
         Ok(())
     }
@@ -316,8 +317,10 @@ impl<'a> StudyRunner<'a> {
         let wants_all = run.experiment.eval.include_seen && !self.known.is_empty();
         let known = known_result(&folder.join(RESULT)).filter(|_| is_saved);
         // Runs that joined or left the study change the levels that all are measured on.
-        let is_current =
-            |result: &StudyResult| result.left_out.iter().eq(&self.known) && (result.with_seen.is_some() || !wants_all);
+        let is_current = |result: &StudyResult| {
+            let is_same = result.left_out.iter().eq(&self.known) && result.test.seen == self.measured_known;
+            is_same && (result.with_seen.is_some() || !wants_all)
+        };
         if let Some(result) = known.filter(is_current) {
             let result = StudyResult { with_seen: result.with_seen.filter(|_| wants_all), ..result };
             return Ok(Some((result, learning_curves(&folder)?)));
@@ -575,8 +578,9 @@ impl<'a> StudyRunner<'a> {
     ) -> Result<(TestResult, Option<TestResult>), EvalError> {
         let (name, split) = (run.id(), &run.experiment.test);
         let held_out = HeldOut::new(game, split);
-        let result = |summary: &EvalSummary, left_out: &BTreeSet<u64>| TestResult {
+        let result = |summary: &EvalSummary, left_out: &BTreeSet<u64>, seen: u64| TestResult {
             layouts: held_out.different(left_out),
+            seen,
             ..TestResult::from(summary)
         };
         let all = run.experiment.eval_plan(split, self.setup.threads);
@@ -584,7 +588,7 @@ impl<'a> StudyRunner<'a> {
         let mut episodes = play(game, &name, player, &new, observer)?;
         let summary = summarize(&name, split, &episodes);
         observer.observe(RunEvent::Measured(&summary));
-        let test = result(&summary, &self.known);
+        let test = result(&summary, &self.known, self.measured_known);
         if !wants_all {
             return Ok((test, None));
         }
@@ -596,7 +600,7 @@ impl<'a> StudyRunner<'a> {
         episodes.sort_by_key(|episode| episode.level);
         let summary = summarize(&name, split, &episodes);
         observer.observe(RunEvent::Measured(&summary));
-        Ok((test, Some(result(&summary, &BTreeSet::new()))))
+        Ok((test, Some(result(&summary, &BTreeSet::new(), self.known.len() as u64))))
     }
 
     fn skill_file(&self, run: &StudyRun) -> Result<PathBuf, StudyRunError> {

@@ -81,6 +81,7 @@ fn result(trainer: &Trainer) -> StudyResult {
         with_seen: None,
         test: TestResult {
             layouts: None,
+            seen: 0,
             episodes: 1,
             success: 0.0,
             success_se: 0.0,

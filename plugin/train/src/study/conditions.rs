@@ -36,12 +36,15 @@ impl StudyReport {
     fn measured_levels(&self) -> String {
         let Experiment { test, eval, .. } = &self.experiment;
         let (each, left_out) = (times(eval.episodes_per_level), self.known_levels().len() as u64);
-        let layouts = self.results.first().and_then(|run| run.test.layouts);
+        let test_result = self.results.first().map(|run| &run.test);
+        let is_known = test_result.is_some_and(|result| result.seen > 0);
+        let unseen = if is_known { ". Some run of the study knows each of them: none is new" } else { "" };
+        let layouts = test_result.and_then(|result| result.layouts);
         let layouts = layouts.map(|layouts| count_of(layouts, "different layout"));
         let levels = count_of(test.len().saturating_sub(left_out), "level");
         match (left_out, layouts) {
-            (0, None) => format!("Measured on {test}, each level {each}"),
-            (0, Some(layouts)) => format!("Measured on {test}, {levels} of {layouts}, each level {each}"),
+            (0, None) => format!("Measured on {test}, each level {each}{unseen}"),
+            (0, Some(layouts)) => format!("Measured on {test}, {levels} of {layouts}, each level {each}{unseen}"),
             (_, layouts) => format!(
                 "Measured on {levels} of {test}{}, each level {each}. {} left out, since some run of the study is trained on \
                  their layouts or learns from recordings of them",
@@ -138,6 +141,7 @@ mod tests {
             with_seen: None,
             test: TestResult {
                 layouts: None,
+                seen: 0,
                 episodes: 1,
                 success: 1.0,
                 success_se: 0.0,
@@ -181,6 +185,12 @@ mod tests {
             measured(Some(4), &[9, 10, 11]),
             "Measured on 5 levels of plain:8..15, which have 4 different layouts, each level once. 3 levels are left out, \
              since some run of the study is trained on their layouts or learns from recordings of them"
+        );
+        let mut known = report(&[("full", "")]);
+        known.results[0].test.seen = 8;
+        assert_eq!(
+            known.measured_levels(),
+            "Measured on plain:8..15, each level once. Some run of the study knows each of them: none is new"
         );
         let of_play = measured(None, &[9]);
         assert!(

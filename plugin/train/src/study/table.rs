@@ -243,6 +243,7 @@ mod tests {
             with_seen: None,
             test: TestResult {
                 layouts: None,
+                seen: 0,
                 episodes: 100,
                 success,
                 success_se: (success * (1.0 - success) / 100.0f64).sqrt(),

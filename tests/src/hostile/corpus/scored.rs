@@ -177,6 +177,7 @@ fn study_result() -> StudyResult {
         with_seen: None,
         test: TestResult {
             layouts: Some(5),
+            seen: 3,
             episodes: 8,
             success: 0.5,
             success_se: 0.125,
