@@ -132,6 +132,9 @@ fn a_small_run_from_demonstrations_to_evaluation() {
             assert_eq!((&row["levels"], &row["layouts"]), (&levels.into(), &levels.into()), "{row}");
         }
     }
+    let exported = ok(run(&["policy", "export", "--run", "runs/c", "--out", "c.policy"]));
+    let command = "eval --policy c.policy --levels hard:142..145 --new-layouts`";
+    assert!(errors(&exported).contains(command), "{}", errors(&exported));
     let table = ok(run(&["eval", "--run", "runs/c", "--include-seen"]));
     assert!(said(&table).contains("hard:142..145 with 1 seen"), "{}", said(&table));
     let both = run(&["eval", "--run", "runs/c", "--include-seen", "--new-layouts"]);
