@@ -231,6 +231,60 @@ fn what_any_variant_lacks_is_said_before_the_first_one_begins() {
 }
 
 #[test]
+fn held_out_levels_of_a_known_layout_are_left_out_and_measured_apart_if_wanted() {
+    let folder = prepared();
+    let folder = folder.path();
+    // Levels 81 and 142 differ in their pictures only.
+    let twins = |more: &[&str]| {
+        let set = ["--seeds", "1", "--set", "steps=128", "--set", "train=hard:81..82", "--set", "test=hard:142..145"];
+        study(folder, "runs", &[&set, &["--variant", "plain", "--variant", "cloned"][..], more].concat())
+    };
+    let results = || -> Value {
+        serde_json::from_slice(&fs::read(folder.join("out/results.json")).expect("written")).expect("JSON")
+    };
+    let table = || fs::read_to_string(folder.join("out/table.md")).expect("written");
+    let without = ok(twins(&[]));
+    assert!(errors(&without).contains("left out of hard:142..145: 1 level of a layout that"), "{}", errors(&without));
+    let words =
+        "Measured on 3 levels of hard:142..145, which have 3 different layouts, each level once. 1 level is left out, ";
+    assert!(table().contains(words) && !table().contains("All 4 levels"), "{}", table());
+    let expected = (written(folder), results());
+    for row in expected.1["results"].as_array().expect("rows") {
+        // Behaviour cloning has not seen it, and is measured on the levels of the others.
+        assert_eq!((&row["left_out"], row["with_seen"].is_null()), (&Value::from(vec![142]), true), "{row}");
+        assert_eq!((row["test"]["layouts"].as_u64(), row["test"]["episodes"].as_u64()), (Some(3), Some(3)), "{row}");
+    }
+
+    let metrics = folder.join("runs/plain-seed1/metrics.jsonl");
+    let before = fs::metadata(&metrics).and_then(|data| data.modified()).expect("there");
+    let with = ok(twins(&["--resume", "--include-seen"]));
+    assert!(errors(&with).contains("measured apart of hard:142..145: 1 level"), "{}", errors(&with));
+    let words = "All 4 levels of hard:142..145, with the 1 that some run knows.";
+    assert!(table().contains(words) && table().contains(" --include-seen --out out\n"), "{}", table());
+    assert!(said(&with).contains(words), "{}", said(&with));
+    for (row, known) in results()["results"].as_array().expect("rows").iter().zip(&[0, 1]) {
+        assert_eq!(row["test"], expected.1["results"][*known]["test"], "the others are measured as they were");
+        assert_eq!((&row["with_seen"]["layouts"], &row["with_seen"]["seen"]), (&4.into(), &1.into()), "{row}");
+        assert_eq!(row["with_seen"]["level_returns"].as_array().map(Vec::len), Some(4), "{row}");
+    }
+    assert_eq!(fs::metadata(&metrics).and_then(|data| data.modified()).expect("there"), before, "it was trained again");
+    ok(twins(&["--resume"]));
+    assert!(written(folder) == expected.0, "the table of all levels left something behind");
+
+    // Level 501 has the layout of the recorded level 4 of the other mode, and there is no other.
+    let recorded = |more: &[&str]| {
+        let set = ["--seeds", "1", "--set", "test=hard:501..501", "--variant", "cloned", "--force"];
+        study(folder, "others", &[&set, more].concat())
+    };
+    refused(&recorded(&[]), "each of the held-out levels hard:501..501 has a layout that this study trains on or");
+    assert!(!folder.join("others/cloned-seed1/result.json").exists());
+    ok(recorded(&["--include-seen"]));
+    let words = "Measured on hard:501..501, 1 level of 1 different layout, each level once. Some run of the study knows each of \
+                 them: none is new.";
+    assert!(table().contains(words), "{}", table());
+}
+
+#[test]
 fn the_table_follows_from_the_results() {
     let folder = prepared();
     let folder = folder.path();

@@ -119,21 +119,36 @@ fn a_small_run_from_demonstrations_to_evaluation() {
     let measured = |more: &[&str]| ok(run(&[&["eval", "--run", "runs/c", "--bot", "random", "--json"], more].concat()));
     let known = "runs/c knows 1 of the 4 levels hard:142..145: by number or layout they are among hard:81..81";
     for (more, left_out, words) in [
-        (&[][..], Some(1), "1 level of hard:142..145 is left out"),
-        (&["--levels", "hard:142..145"][..], None, "--new-layouts leaves it out"),
-        (&["--levels", "hard:142..145", "--new-layouts"][..], Some(1), "1 level of hard:142..145 is left out"),
+        (&[][..], true, "1 level of hard:142..145 is left out"),
+        (&["--include-seen"][..], false, "1 level of hard:142..145 is measured with the others, though no unseen one"),
+        (&["--levels", "hard:142..145"][..], false, "--new-layouts leaves it out"),
+        (&["--levels", "hard:142..145", "--new-layouts"][..], true, "1 level of hard:142..145 is left out"),
     ] {
         let output = measured(more);
         assert!(errors(&output).contains(known) && errors(&output).contains(words), "{}", errors(&output));
+        let (one, levels) = (|is: bool| is.then_some(1), if left_out { 3 } else { 4 });
         for row in lines(&output) {
-            assert_eq!((row["left_out"].as_u64(), row["levels"].as_u64()), (left_out, Some(4 - left_out.unwrap_or(0))));
+            assert_eq!((row["left_out"].as_u64(), row["seen"].as_u64()), (one(left_out), one(!left_out)), "{row}");
+            assert_eq!((&row["levels"], &row["layouts"]), (&levels.into(), &levels.into()), "{row}");
         }
     }
+    let exported = ok(run(&["policy", "export", "--run", "runs/c", "--out", "c.policy"]));
+    let command = "eval --policy c.policy --levels hard:142..145 --new-layouts`";
+    assert!(errors(&exported).contains(command), "{}", errors(&exported));
+    let table = ok(run(&["eval", "--run", "runs/c", "--include-seen"]));
+    assert!(said(&table).contains("hard:142..145 with 1 seen"), "{}", said(&table));
+    let both = run(&["eval", "--run", "runs/c", "--include-seen", "--new-layouts"]);
+    assert_eq!(code(&both), 3, "{}", errors(&both));
     let all_known = run(&["eval", "--run", "runs/c", "--levels", "hard:142..142", "--new-layouts"]);
     assert_eq!(code(&all_known), 3);
     assert!(errors(&all_known).contains("every one of the levels hard:142..142"), "{}", errors(&all_known));
     let tested = run(&["test", "coinrun", "--run", "runs/c", "--levels", "hard:142..145", "--out", "runs/tested"]);
     assert!(errors(&tested).contains(known), "{}", errors(&tested));
+    let written = |name: &str| std::fs::read_to_string(folder.path().join("runs/tested").join(name)).expect("written");
+    for name in ["summary.md", "report.html"] {
+        assert!(written(name).contains("c has learned from 1 level of this test, or from equal ones."), "{name}");
+    }
+    assert!(written("results.json").contains("\"known\":1"), "{}", written("results.json"));
 
     let saved = folder.path().join("runs/b/experiment.ron");
     let text = unsealed(&std::fs::read_to_string(&saved).expect("written")).replace("\"coinrun\"", "\"maze\"");

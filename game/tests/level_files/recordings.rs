@@ -83,4 +83,13 @@ fn learning_refuses_recordings_of_held_out_files() {
         "{}",
         errors(&output)
     );
+
+    // A numbered level of the same layout is no new one for them.
+    let (row, words) = done(folder, &["eval", "--skills", "s.safetensors", "--set", "test=easy:1..2", "--json"]);
+    assert!(words.contains("1 level of easy:1..2 is left out"), "{words}");
+    let row: Value = serde_json::from_str(&row).expect("one line of JSON");
+    assert_eq!(
+        (row["levels"].as_u64(), row["left_out"].as_u64(), row["layouts"].as_u64()),
+        (Some(1), Some(1), Some(1))
+    );
 }

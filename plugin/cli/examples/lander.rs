@@ -120,9 +120,8 @@ pub fn all_steps(experiment: &str, demos: &str, policy: &Path) -> Result<[EvalSu
     let file = pipeline::policy(&Lander, &trainer);
     export_policy(&Lander, &file, &experiment.train, experiment.seed, policy)?;
     let player = Player::of_file(&file, ActionDraw::Sample);
-    let learned = pipeline::evaluate(&Lander, &experiment, "SCORE-PPO", &player, threads)?;
-    let random = pipeline::evaluate(&Lander, &experiment, "random", &Player::Blind(BlindBot::Uniform), threads)?;
-    Ok([learned, random])
+    let measure = |name, player| pipeline::evaluate(&Lander, &experiment, name, player, trainer.seen(), threads);
+    Ok([measure("SCORE-PPO", &player)?, measure("random", &Player::Blind(BlindBot::Uniform))?])
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

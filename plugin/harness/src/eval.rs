@@ -396,6 +396,13 @@ pub struct EvalSummary {
     /// Levels of the range that were left out, since the compared players know them.
     #[serde(skip_serializing_if = "is_zero")]
     pub left_out: u64,
+    /// Levels that were played although the compared players know them. [`summarize`] sets 0.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub seen: u64,
+    /// Different layouts of the levels that were played; `None` if unknown: see
+    /// [`HeldOut::different`](crate::held_out::HeldOut::different). [`summarize`] sets `None`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub layouts: Option<u64>,
     /// Episodes.
     pub episodes: u64,
     /// Mean return.
@@ -435,6 +442,8 @@ pub fn summarize(method: &str, split: &LevelSplit, results: &[EpisodeResult]) ->
         split: split.to_string(),
         levels: level_returns.len() as u64,
         left_out: split.len().saturating_sub(level_returns.len() as u64),
+        seen: 0,
+        layouts: None,
         episodes: results.len() as u64,
         return_mean: mean(&returns),
         return_se: error_over_levels(&returns),

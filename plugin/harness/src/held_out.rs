@@ -37,6 +37,9 @@ const MOST_COMPARED: u64 = 1 << 18;
 /// Largest number of training levels that the check of an experiment draws.
 const MOST_CHECKED: u64 = 1 << 12;
 
+/// Largest number of levels whose layouts a result counts, so that counting takes no time beside playing.
+const MOST_COUNTED: u64 = 1 << 16;
+
 /// Levels by the hash of their layout, each list in ascending order.
 pub type LevelsByLayout = BTreeMap<u64, Vec<u64>>;
 
@@ -154,12 +157,25 @@ impl<'a> HeldOut<'a> {
         Some(if is_all { shown } else { format!("{shown}, among others") })
     }
 
+    /// Returns the number of different layouts among the levels that are not left out. `None` if the game does not hash
+    /// the layout of each, or if there are more than 65,536 levels.
+    pub fn different(&self, left_out: &BTreeSet<u64>) -> Option<u64> {
+        if self.split.len() > MOST_COUNTED {
+            return None;
+        }
+        let (layouts, hashed) = (self.layouts(), self.layouts().values().map(Vec::len).sum::<usize>());
+        let is_whole = hashed > 0 && hashed as u64 == self.split.len();
+        let is_played = |levels: &&Vec<u64>| levels.iter().any(|level| !left_out.contains(level));
+        is_whole.then(|| layouts.values().filter(is_played).count() as u64)
+    }
+
     /// Returns the held-out levels that are seen: by number, as a file, or by their layout.
     ///
     /// All levels of all ranges are compared by their numbers, and those of the first ranges by their layouts, up to
-    /// 262,144 levels. If the game has no layouts and [compares states](crate::game::StateTools::compares_levels), the
-    /// first ranges are compared by their play, up to 128 levels with the held-out ones. If all held-out levels play like seen ones, none is left out for that: the
-    /// game has no others. `progress` is that of [`AlikeLevels::of`], and is called only if levels are played.
+    /// 262,144 levels. A larger range is named in a warning. If the game has no layouts and [compares
+    /// states](crate::game::StateTools::compares_levels), the first ranges are compared by their play, up to 128 levels
+    /// with the held-out ones. If all held-out levels play like seen ones, none is left out for that: the game has no
+    /// others. `progress` is that of [`AlikeLevels::of`], and is called only if levels are played.
     pub fn seen_in(&self, seen: &SeenLevels, progress: &(dyn Fn(u64, u64) + Sync)) -> BTreeSet<u64> {
         let mut found = BTreeSet::new();
         if seen.game != self.game.name() || !self.holds {
@@ -170,11 +186,19 @@ impl<'a> HeldOut<'a> {
             if let Some((first, last)) = self.common(range) {
                 found.extend(first..=last);
             }
-            if range.len() <= left && !self.layouts().is_empty() {
-                left -= range.len();
-                let layouts = range.levels().filter_map(|level| self.game.layout(&range.mode, level));
-                self.add_layouts(layouts, &mut found);
+            if self.layouts().is_empty() {
+                continue;
             }
+            if range.len() > left {
+                tracing::warn!(
+                    "{range} are too many levels to compare with {} by their layouts: some of these may be no unseen levels",
+                    self.split
+                );
+                continue;
+            }
+            left -= range.len();
+            let layouts = range.levels().filter_map(|level| self.game.layout(&range.mode, level));
+            self.add_layouts(layouts, &mut found);
         }
         let is_file = |level: &u64| {
             let hash = file_hash(self.game, &self.split.mode, *level);
@@ -616,6 +640,22 @@ mod tests {
         assert_eq!(known(&game, "default:1000..6000"), Vec::<u64>::new(), "that would take long");
         let layouts = game.layout(|_, level| level);
         assert_eq!(known(&layouts, "default:0..1"), Vec::<u64>::new(), "its layouts say more");
+    }
+
+    #[test]
+    fn layouts_that_are_not_left_out_are_counted_once() {
+        let (game, split) = (dots(|_| 0.0, |_| 0.0), "default:0..9".parse().expect("levels"));
+        let different = |game: &ForeignGame, left_out: &[u64]| {
+            HeldOut::new(game, &split).different(&left_out.iter().copied().collect())
+        };
+        assert_eq!(different(&game, &[]), None, "it has no layouts");
+        // 0, 4 and 8 are equal, and so are 3 and 7.
+        let layouts = game.layout(|_, level| level % 4);
+        assert_eq!(different(&layouts, &[]), Some(4));
+        assert_eq!(different(&layouts, &[0, 4, 3]), Some(4), "8 and 7 are left");
+        assert_eq!(different(&layouts, &[0, 4, 8, 3]), Some(3));
+        let many = "default:0..65536".parse().expect("levels");
+        assert_eq!(HeldOut::new(&layouts, &many).different(&BTreeSet::new()), None, "that would take long");
     }
 
     #[test]

@@ -26,7 +26,7 @@ mod tests;
 use crate::{
     verdict::{
         AGAINST, Comparison, EpisodeScore, LevelVerdict, Overview, RESULTS, RecordedTotal, TestError, TestRecord,
-        Trials, comparable_command, wilson,
+        TesterRecord, Trials, comparable_command, wilson,
     },
     verdict_report::{
         drawn::Plans,
@@ -192,7 +192,11 @@ pub(crate) fn numbers(overview: &Overview) -> String {
         let (levels, episodes, places) = (cells(total.levels), cells(total.episodes), total.places.describe());
         let _ = writeln!(out, "<tr><th scope=\"row\">{name}</th>{levels}{episodes}<td>{places}</td></tr>");
     }
-    out + "</tbody></table></div>\n<p class=\"key\">Intervals are 95 % Wilson intervals.</p>\n</section>\n"
+    out += "</tbody></table></div>\n";
+    for known in overview.record.testers.iter().filter_map(TesterRecord::describe_known) {
+        let _ = writeln!(out, "<p>{}.</p>", text(&known));
+    }
+    out + "<p class=\"key\">Intervals are 95 % Wilson intervals.</p>\n</section>\n"
 }
 
 /// Writes the section of the page.

@@ -130,6 +130,9 @@ settings! {
     episodes_per_level: u32 = 1, in Range::COUNT;
     /// Take the most probable action instead of drawing one.
     greedy: bool = false;
+    /// Measure held-out levels of a layout that was trained on or recorded, too. By default they are left out. A study
+    /// measures them apart, and adds a table of all levels.
+    include_seen: bool = false, off "is_off";
 }
 
 settings! {

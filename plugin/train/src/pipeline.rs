@@ -24,7 +24,7 @@
 //! let trainer = pipeline::train(game, &experiment, Some((file, &skills)), run, &setup, &mut observer)?;
 //! let policy = pipeline::policy(game, &trainer);
 //! let player = Player::of_file(&policy, ActionDraw::Sample);
-//! let measured = pipeline::evaluate(game, &experiment, "score-ppo", &player, 2)?;
+//! let measured = pipeline::evaluate(game, &experiment, "score-ppo", &player, trainer.seen(), 2)?;
 //! println!("{:.0} % success on {}", 100.0 * measured.success, measured.split);
 //! playbot_train::policy_export::export_policy(game, &policy, &experiment.train, 1, "lander.policy".as_ref())?;
 //! # Ok(())
@@ -50,13 +50,17 @@ use bevy_playbot::{
 use playbot_harness::{
     demo::demonstration::DemonstrationPlan,
     eval,
-    eval::{EvalError, EvalSummary, Player, summarize},
+    eval::{EvalError, EvalPlan, EvalSummary, Player, summarize},
     game::Game,
+    held_out::HeldOut,
     mode::ModeError,
     split::LevelSplit,
 };
-use playbot_learner::{FileError, PolicyFile, SkillModel};
-use std::path::{Path, PathBuf};
+use playbot_learner::{FileError, PolicyFile, SeenLevels, SkillModel};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 use thiserror::Error;
 
 /// Failure of a step.
@@ -241,6 +245,9 @@ pub fn train(
 
 /// Measures a player on the experiment's held-out levels, each equally often. `name` is the name in the summary.
 ///
+/// Levels that are known by what was `seen`, such as [`Trainer::seen`], are left out: those of an equal layout, or that
+/// play alike. They are measured if the experiment asks for it (`eval.include_seen`), or if there are no others.
+///
 /// # Errors
 ///
 /// The mode is invalid, the game broke its contract, or it does not support the experiment's observations.
@@ -249,11 +256,17 @@ pub fn evaluate(
     experiment: &Experiment,
     name: &str,
     player: &Player,
+    seen: Option<&SeenLevels>,
     threads: usize,
 ) -> Result<EvalSummary, PipelineError> {
     experiment.check_test(game)?;
-    let plan = experiment.eval_plan(&experiment.test, threads);
-    Ok(summarize(name, &plan.split, &eval::evaluate(game, player, &plan, |_| {})?))
+    let held_out = HeldOut::new(game, &experiment.test);
+    let known = seen.map(|seen| held_out.seen_in(seen, &|_, _| {})).unwrap_or_default();
+    let keeps_all = experiment.eval.include_seen || known.len() as u64 == experiment.test.len();
+    let (left_out, seen) = if keeps_all { (BTreeSet::new(), known.len() as u64) } else { (known, 0) };
+    let plan = EvalPlan { left_out, ..experiment.eval_plan(&experiment.test, threads) };
+    let summary = summarize(name, &plan.split, &eval::evaluate(game, player, &plan, |_| {})?);
+    Ok(EvalSummary { seen, layouts: held_out.different(&plan.left_out), ..summary })
 }
 
 /// Returns the policy learned so far, as the file that a game ships with.

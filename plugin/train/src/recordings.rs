@@ -143,14 +143,14 @@ pub fn read_rollouts(
     Ok(Recorded { rollouts, seen })
 }
 
-/// Checks that the recordings of an experiment can be read, are of its game, and show no held-out level. Nothing is
-/// replayed.
+/// Checks that the recordings of an experiment can be read, are of its game, and show no held-out level. Returns the
+/// levels that they show. Nothing is replayed.
 ///
 /// # Errors
 ///
 /// As [`read_dataset`], but for the errors of replays.
-pub fn check_recordings(game: &dyn Game, experiment: &Experiment, path: &Path) -> Result<(), RecordingsError> {
-    open(game, experiment, path).map(drop)
+pub fn check_recordings(game: &dyn Game, experiment: &Experiment, path: &Path) -> Result<SeenLevels, RecordingsError> {
+    open(game, experiment, path).map(|demos| demos.seen_levels(game))
 }
 
 fn open(game: &dyn Game, experiment: &Experiment, path: &Path) -> Result<Demonstrations, RecordingsError> {

@@ -6,7 +6,7 @@ use crate::{
     study::{StudyResult, StudyRun},
 };
 use bevy_playbot::vision::ObservationConfig;
-use playbot_harness::eval::EvalSummary;
+use playbot_harness::{eval::EvalSummary, split::LevelSplit};
 use playbot_learner::SkillMetrics;
 use std::path::Path;
 
@@ -143,6 +143,15 @@ pub enum RunEvent<'a> {
     },
     /// The training of a run ended or was stopped.
     TrainingEnded,
+    /// Some held-out levels of a study have layouts that its runs train on or that are recorded.
+    KnownLevels {
+        /// The held-out levels.
+        test: &'a LevelSplit,
+        /// The number of those that are known.
+        known: u64,
+        /// True if they are measured, too.
+        is_measured: bool,
+    },
     /// A player was measured.
     Measured(&'a EvalSummary),
     /// A run of a study begins.

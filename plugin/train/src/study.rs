@@ -198,8 +198,15 @@ pub struct StudyResult {
     pub seed: u64,
     /// Result of training; `None` without training, as in behaviour cloning.
     pub training: Option<TrainingResult>,
-    /// The measurement on the held-out levels.
+    /// The measurement on the held-out levels that are new to each run of the study.
     pub test: TestResult,
+    /// The other held-out levels, in ascending order: some run is trained on their layouts or learns from recordings of
+    /// them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<u64>,
+    /// The measurement on all held-out levels, if there are others and they were wanted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub with_seen: Option<TestResult>,
 }
 
 /// Result of training. Rates and means are over the last 100 training episodes.
@@ -218,6 +225,12 @@ pub struct TrainingResult {
 /// A measurement on held-out levels, each played equally often. Standard errors are over levels, as in [`EvalSummary`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TestResult {
+    /// Different layouts of the levels; `None` if the game does not hash them, and in results of older versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub layouts: Option<u64>,
+    /// Levels that some run of the study knows.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub seen: u64,
     /// Episodes.
     pub episodes: u64,
     /// Share of episodes that reached the level's goal.
@@ -235,9 +248,15 @@ pub struct TestResult {
     pub level_returns: Vec<f64>,
 }
 
+fn is_zero(count: &u64) -> bool {
+    *count == 0
+}
+
 impl From<&EvalSummary> for TestResult {
     fn from(summary: &EvalSummary) -> Self {
         Self {
+            layouts: summary.layouts,
+            seen: summary.seen,
             episodes: summary.episodes,
             success: summary.success,
             success_se: summary.success_se,
@@ -374,6 +393,11 @@ fn over_seeds(seeds: usize) -> &'static str {
 }
 
 impl StudyReport {
+    /// Returns the levels that some run knows, and of which there is a measurement besides.
+    pub(crate) fn known_levels(&self) -> &[u64] {
+        self.results.first().map_or(&[], |run| &run.left_out)
+    }
+
     /// Returns the paired differences of the first variant from each other one.
     pub fn differences(&self) -> String {
         let variants = self.variants();

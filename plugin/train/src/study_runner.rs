@@ -3,7 +3,7 @@
 use crate::{
     checkpoint::CheckpointChoice,
     error::TrainError,
-    experiment::{Experiment, ExperimentError},
+    experiment::{EvalConfig, Experiment, ExperimentError},
     learn_skills,
     learn_skills::{LearnSkillsError, behaviour_cloning},
     metrics_log::{EPISODIC_RETURN, SUCCESS_RATE},
@@ -20,10 +20,10 @@ use crate::{
 };
 use bevy_playbot::{policy::ActionDraw, unknown_name::UnknownName, vision::ObservationConfig};
 use playbot_harness::{
-    eval::{EvalError, EvalPlan, EvalSummary, Player, evaluate, summarize},
+    eval::{EpisodeResult, EvalError, EvalPlan, EvalSummary, Player, evaluate, summarize},
     game::Game,
     games::Games,
-    held_out::HeldOut,
+    held_out::{HeldOut, seen_by_training},
     sealed_file::{SealedFileError, io_error, read_sealed, write_atomically, write_sealed},
     split::LevelSplit,
 };
@@ -79,6 +79,12 @@ pub enum StudyRunError {
         /// The held-out levels.
         test: LevelSplit,
     },
+    /// All held-out levels have layouts that were trained on or recorded.
+    #[error(
+        "each of the held-out levels {0} has a layout that this study trains on or that is recorded: name others with \
+         `test`, or measure all of them with --include-seen"
+    )]
+    AllSeen(LevelSplit),
     /// The recordings cannot be learned from.
     #[error(transparent)]
     Recordings(Box<RecordingsError>),
@@ -125,7 +131,7 @@ impl HasExitCode for StudyRunError {
         match self {
             Self::Game(error) => error.exit_code(),
             Self::Experiment(error) => error.exit_code(),
-            Self::OtherSettings { .. } | Self::SkillFile(_) | Self::SeenSkills { .. } => 3,
+            Self::OtherSettings { .. } | Self::SkillFile(_) | Self::SeenSkills { .. } | Self::AllSeen(_) => 3,
             Self::Recordings(error) => error.exit_code(),
             Self::Skills(error) => error.exit_code(),
             Self::Model(error) => error.exit_code(),
@@ -159,10 +165,14 @@ pub struct StudyRunner<'a> {
     setup: TrainingSetup<'a>,
     /// Skill models that were learned already.
     learned: BTreeSet<PathBuf>,
-    /// Recordings that proved readable.
-    checked: Vec<RecordingsKey>,
+    /// Recordings that proved readable, with the levels that they show.
+    checked: Vec<(RecordingsKey, SeenLevels)>,
     /// The last recordings that were read.
     last: Option<(RecordingsKey, Dataset)>,
+    /// Held-out levels that some run of the study knows. All runs are measured on the others.
+    known: BTreeSet<u64>,
+    /// The number of known levels that are measured like new ones, since there are no new ones.
+    measured_known: u64,
 }
 
 /// The folder of a run, locked.
@@ -187,16 +197,17 @@ pub type Ended = Option<(StudyResult, LearningCurves)>;
 impl<'a> StudyRunner<'a> {
     /// Makes a runner of runs in `folder`. With `force`, existing runs are replaced instead of resumed.
     pub fn new(games: &'a Games<'a>, folder: &Path, force: bool, setup: TrainingSetup<'a>) -> Self {
-        let (learned, checked, last) = (BTreeSet::new(), Vec::new(), None);
-        Self { games, folder: folder.into(), force, setup, learned, checked, last }
+        let (learned, checked, last, known) = (BTreeSet::new(), Vec::new(), None, BTreeSet::new());
+        Self { games, folder: folder.into(), force, setup, learned, checked, last, known, measured_known: 0 }
     }
 
     /// Brings all runs to their ends, one after the other, and returns the report with their results. `None` if the
-    /// observer stopped a run.
+    /// observer stopped a run. All of them are measured on the held-out levels that are new to each.
     ///
     /// # Errors
     ///
-    /// As for [`run`](Self::run).
+    /// A folder holds a run with other settings, no held-out level is new, or learning, training, measuring or saving
+    /// fails.
     pub fn run_all(
         &mut self,
         runs: &[StudyRun],
@@ -204,6 +215,7 @@ impl<'a> StudyRunner<'a> {
         experiment: Experiment,
         observer: &mut dyn RunObserver,
     ) -> Result<Option<StudyReport>, StudyRunError> {
+        self.note_known(runs, &experiment, observer)?;
         let mut report = StudyReport { command, experiment, results: Vec::new(), curves: Vec::new() };
         for (index, run) in runs.iter().enumerate() {
             observer.observe(RunEvent::StudyRunBegun { index, run });
@@ -217,17 +229,100 @@ impl<'a> StudyRunner<'a> {
         Ok(Some(report))
     }
 
+    /// Finds the held-out levels that some run knows: by number, as a file, or by their layout. A comparison of runs
+    /// needs the same levels for all of them.
+    fn note_known(
+        &mut self,
+        runs: &[StudyRun],
+        study: &Experiment,
+        observer: &mut dyn RunObserver,
+    ) -> Result<(), StudyRunError> {
+        let mut compared = Vec::new();
+        (self.known, self.measured_known) = (BTreeSet::new(), 0);
+        for run in runs {
+            let game = self.games.get(&run.experiment.game)?;
+            let seen = self.seen_by(game, run, observer)?;
+            if !compared.contains(&seen) {
+                self.known.extend(HeldOut::new(game, &run.experiment.test).seen_in(&seen, &|_, _| {}));
+                compared.push(seen);
+            }
+        }
+        let (test, known, is_measured) = (&study.test, self.known.len() as u64, study.eval.include_seen);
+        if known > 0 {
+            observer.observe(RunEvent::KnownLevels { test, known, is_measured });
+        }
+        if known == test.len() {
+            if !is_measured {
+                return Err(StudyRunError::AllSeen(test.clone()));
+            }
+            (self.known, self.measured_known) = (BTreeSet::new(), known);
+        }
+        Ok(())
+    }
+
+    /// Returns the levels that a run sees in training and in recordings.
+    fn seen_by(
+        &mut self,
+        game: &dyn Game,
+        run: &StudyRun,
+        observer: &mut dyn RunObserver,
+    ) -> Result<SeenLevels, StudyRunError> {
+        let (experiment, folder) = (&run.experiment, self.folder.join(run.id()));
+        let trained = || match experiment.algorithm.is_trained() {
+            true => seen_by_training(game, &experiment.train),
+            false => SeenLevels { game: game.name().to_owned(), ..SeenLevels::default() },
+        };
+        end_replacement(&folder)?;
+        if let Some(info) = self.saved(run, &folder)? {
+            // Runs of older versions have no note.
+            return Ok(info.seen.unwrap_or_else(trained));
+        }
+        let mut seen = trained();
+        if experiment.algorithm.learns_from_demos() {
+            seen.extend(&self.recorded(game, run, observer)?);
+        }
+        Ok(seen)
+    }
+
+    /// Returns the levels of the recordings that a new run learns from, or its skills have learned from.
+    fn recorded(
+        &mut self,
+        game: &dyn Game,
+        run: &StudyRun,
+        observer: &mut dyn RunObserver,
+    ) -> Result<SeenLevels, StudyRunError> {
+        let file = self.skill_file(run)?;
+        if run.experiment.algorithm.needs_skills() && !self.force && file.exists() {
+            let model = self.load_skills(game, &run.experiment, file)?;
+            return Ok(model.demos().cloned().unwrap_or_default());
+        }
+        let key = self.recordings_key(&run.experiment)?;
+        if let Some((_, seen)) = self.checked.iter().find(|(checked, _)| *checked == key) {
+            return Ok(seen.clone());
+        }
+        find_recordings(&run.experiment, self.setup.recordings, observer)?;
+        let seen = check_recordings(game, &run.experiment, &key.path)?;
+        self.checked.push((key, seen.clone()));
+        Ok(seen)
+    }
+
     /// Brings a run to its end.
-    ///
-    /// # Errors
-    ///
-    /// The folder holds a run with other settings, or learning, training, measuring or saving fails.
-    pub fn run(&mut self, run: &StudyRun, observer: &mut dyn RunObserver) -> Result<Ended, StudyRunError> {
+    fn run(&mut self, run: &StudyRun, observer: &mut dyn RunObserver) -> Result<Ended, StudyRunError> {
         let game = self.games.get(&run.experiment.game)?;
         let folder = self.folder.join(run.id());
         end_replacement(&folder)?;
-        let is_saved = self.is_saved(run, &folder)?;
-        if is_saved && let Some(result) = known_result(&folder.join(RESULT)) {
+        let saved = self.saved(run, &folder)?;
+        saved.iter().for_each(|info| self.warn_of_others(&folder, info));
+        let is_saved = saved.is_some();
+        let wants_all = run.experiment.eval.include_seen && !self.known.is_empty();
+        let known = known_result(&folder.join(RESULT)).filter(|_| is_saved);
+        // Runs that joined or left the study change the levels that all are measured on.
+        let is_current = |result: &StudyResult| {
+            let is_same = result.left_out.iter().eq(&self.known) && result.test.seen == self.measured_known;
+            is_same && (result.with_seen.is_some() || !wants_all)
+        };
+        if let Some(result) = known.filter(is_current) {
+            let result = StudyResult { with_seen: result.with_seen.filter(|_| wants_all), ..result };
             return Ok(Some((result, learning_curves(&folder)?)));
         }
         disk::create_dir_all(&folder).map_err(io_error("create", &folder))?;
@@ -239,14 +334,15 @@ impl<'a> StudyRunner<'a> {
         clock.note(&folder)?;
         let Some(TrainedRun { dir: _dir, player, training, curves }) = trained else { return Ok(None) };
         let experiment = &run.experiment;
-        let plan = experiment.eval_plan(&experiment.test, self.setup.threads);
-        let summary = measure(game, &run.id(), &player, &plan, observer)?;
+        let (test, with_seen) = self.measure(game, run, &player, wants_all, observer)?;
         let result = StudyResult {
             variant: run.variant.clone(),
             algorithm: experiment.algorithm,
             seed: experiment.seed,
             training,
-            test: TestResult::from(&summary),
+            test,
+            left_out: self.known.iter().copied().collect(),
+            with_seen,
         };
         write_sealed(&folder.join(RESULT), &result)?;
         Ok(Some((result, curves)))
@@ -300,19 +396,17 @@ impl<'a> StudyRunner<'a> {
         observer: &mut dyn RunObserver,
     ) -> Result<(), StudyRunError> {
         let key = self.recordings_key(experiment)?;
-        if self.checked.contains(&key) {
+        if self.checked.iter().any(|(checked, _)| *checked == key) {
             return Ok(());
         }
         let (game, setup) = (self.games.get(&experiment.game)?, self.setup);
         match (self.force, key.with_rewards) {
-            (false, _) => {
-                let path = find_recordings(experiment, setup.recordings, observer)?;
-                check_recordings(game, experiment, &path)?;
-            }
+            (false, _) => drop(find_recordings(experiment, setup.recordings, observer)?),
             (true, false) => drop(self.dataset(game, experiment, observer)?),
             (true, true) => drop(read_rollouts(game, experiment, setup.recordings, setup.threads, observer)?),
         }
-        self.checked.push(key);
+        let seen = check_recordings(game, experiment, &key.path)?;
+        self.checked.push((key, seen));
         Ok(())
     }
 
@@ -348,15 +442,16 @@ impl<'a> StudyRunner<'a> {
         })
     }
 
-    /// Returns whether the folder holds this run, to be resumed.
-    fn is_saved(&self, run: &StudyRun, folder: &Path) -> Result<bool, StudyRunError> {
+    /// Returns the metadata of this run if the folder holds it, to be resumed.
+    fn saved(&self, run: &StudyRun, folder: &Path) -> Result<Option<RunInfo>, StudyRunError> {
         if self.force || !folder.exists() || is_unstarted(folder) {
-            return Ok(false);
+            return Ok(None);
         }
         let OpenedRun { experiment: saved, info, .. } = RunDir::open(folder)?;
-        if saved == run.experiment {
-            self.warn_of_others(folder, &info);
-            return Ok(true);
+        // The levels of a measurement are none of training.
+        let eval = EvalConfig { include_seen: saved.eval.include_seen, ..run.experiment.eval.clone() };
+        if saved == (Experiment { eval, ..run.experiment.clone() }) {
+            return Ok(Some(info));
         }
         let (wanted, saved) = (Box::new(run.experiment.clone()), Box::new(saved));
         Err(StudyRunError::OtherSettings { folder: folder.into(), wanted, saved })
@@ -455,11 +550,57 @@ impl<'a> StudyRunner<'a> {
             }
             self.learned.insert(file.clone());
         }
+        self.load_skills(game, experiment, file).map(Some)
+    }
+
+    /// Loads skills for an experiment, whose held-out levels they must not have learned from.
+    fn load_skills(
+        &self,
+        game: &dyn Game,
+        experiment: &Experiment,
+        file: PathBuf,
+    ) -> Result<SkillModel, StudyRunError> {
         let model = SkillModel::load(&file, self.setup.device)?;
         match HeldOut::new(game, &experiment.test).shown_by(model.demos()) {
             Some(seen) => Err(StudyRunError::SeenSkills { file, seen, test: experiment.test.clone() }),
-            None => Ok(Some(model)),
+            None => Ok(model),
         }
+    }
+
+    /// Measures a player on the held-out levels that no run knows, and on all of them if that is wanted.
+    fn measure(
+        &self,
+        game: &dyn Game,
+        run: &StudyRun,
+        player: &Player,
+        wants_all: bool,
+        observer: &mut dyn RunObserver,
+    ) -> Result<(TestResult, Option<TestResult>), EvalError> {
+        let (name, split) = (run.id(), &run.experiment.test);
+        let held_out = HeldOut::new(game, split);
+        let result = |summary: &EvalSummary, left_out: &BTreeSet<u64>, seen: u64| TestResult {
+            layouts: held_out.different(left_out),
+            seen,
+            ..TestResult::from(summary)
+        };
+        let all = run.experiment.eval_plan(split, self.setup.threads);
+        let new = EvalPlan { left_out: self.known.clone(), ..all.clone() };
+        let mut episodes = play(game, &name, player, &new, observer)?;
+        let summary = summarize(&name, split, &episodes);
+        observer.observe(RunEvent::Measured(&summary));
+        let test = result(&summary, &self.known, self.measured_known);
+        if !wants_all {
+            return Ok((test, None));
+        }
+        // The draws of a policy depend on the levels of a plan: with a plan of their own, those that are known do not
+        // change the result of the others.
+        let is_new = |level: &u64| !self.known.contains(level);
+        let known = EvalPlan { left_out: split.levels().filter(is_new).collect(), ..all };
+        episodes.extend(play(game, &name, player, &known, observer)?);
+        episodes.sort_by_key(|episode| episode.level);
+        let summary = summarize(&name, split, &episodes);
+        observer.observe(RunEvent::Measured(&summary));
+        Ok((test, Some(result(&summary, &BTreeSet::new(), self.known.len() as u64))))
     }
 
     fn skill_file(&self, run: &StudyRun) -> Result<PathBuf, StudyRunError> {
@@ -491,19 +632,17 @@ fn known_result(path: &Path) -> Option<StudyResult> {
     Some(read.inspect_err(|error| tracing::warn!("{error}; the run is measured again")).ok()?.0)
 }
 
-/// Measures a player on the levels of a plan.
-fn measure(
+/// Plays the levels of a plan.
+fn play(
     game: &dyn Game,
     name: &str,
     player: &Player,
     plan: &EvalPlan,
     observer: &mut dyn RunObserver,
-) -> Result<EvalSummary, EvalError> {
+) -> Result<Vec<EpisodeResult>, EvalError> {
     let episodes = plan.episodes();
     let counter = observer.counter(CountedWork::Measure { name, episodes });
-    let summary = summarize(name, &plan.split, &evaluate(game, player, plan, counter)?);
-    observer.observe(RunEvent::Measured(&summary));
-    Ok(summary)
+    evaluate(game, player, plan, counter)
 }
 
 /// Returns the training result of a run, from its metrics.

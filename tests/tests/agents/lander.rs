@@ -97,7 +97,7 @@ fn the_pilot_lands_softly() {
     use playbot_harness::eval::Player;
     use playbot_train::{experiment::file::parse_experiment, pipeline};
     let experiment = parse_experiment(lander_example::EXPERIMENT, "lander.ron".as_ref()).expect("valid");
-    let measured = pipeline::evaluate(&lander_example::Lander, &experiment, "pilot", &Player::Demonstrator, 2);
+    let measured = pipeline::evaluate(&lander_example::Lander, &experiment, "pilot", &Player::Demonstrator, None, 2);
     let measured = measured.expect("the pilot can fly");
     assert!(measured.success > 0.9, "{measured:?}");
 }

@@ -8,7 +8,7 @@ use bevy::prelude::*;
 use bevy_playbot::demo::file::{DemoFault, DemoReader, DemoWriter};
 use playbot::prelude::*;
 use playbot_harness::{demo::demonstration::DemonstrationPlan, eval::Player, game::BotTools};
-use playbot_learner::{DeviceKind, PolicyFile};
+use playbot_learner::{DeviceKind, PolicyFile, SeenLevels};
 use playbot_tests::{Corridor, as_corridor};
 use playbot_train::{
     Algorithm, Experiment, UpdateReport,
@@ -98,9 +98,9 @@ fn the_whole_road_leads_from_a_demonstrator_to_a_policy_file() {
     playbot_train::policy_export::export_policy(&Shown, &file, &experiment.train, 1, &path).expect("written");
     let shipped = PolicyFile::load(&path, DeviceKind::Flex).expect("it answers as it did");
 
-    let measure = |file| {
+    let measure = |file: &PolicyFile| {
         let player = Player::of_file(file, ActionDraw::Sample);
-        pipeline::evaluate(&Shown, &experiment, "learned", &player, 2).expect("measured")
+        pipeline::evaluate(&Shown, &experiment, "learned", &player, file.metadata.seen.as_ref(), 2).expect("measured")
     };
     let measured = measure(&file);
     assert_eq!((measured.method.as_str(), measured.split.as_str()), ("learned", "plain:8..15"));
@@ -127,12 +127,36 @@ fn what_chooses_skills_is_shipped_with_what_it_has_learned_of_them() {
         let path = folder.path().join(algorithm.name());
         playbot_train::policy_export::export_policy(&Shown, &file, &experiment.train, 1, &path).expect("written");
         let shipped = PolicyFile::load(&path, DeviceKind::Flex).expect("it answers as it did");
-        let measure = |file| {
+        let measure = |file: &PolicyFile| {
             let player = Player::of_file(file, ActionDraw::Sample);
-            pipeline::evaluate(&Shown, &experiment, "learned", &player, 2).expect("measured")
+            pipeline::evaluate(&Shown, &experiment, "learned", &player, file.metadata.seen.as_ref(), 2)
+                .expect("measured")
         };
         assert_eq!(measure(&shipped), measure(&file), "{algorithm}: what is shipped plays as what was trained");
     }
+}
+
+#[test]
+fn held_out_levels_of_a_seen_layout_are_left_out_of_a_measurement() {
+    let game = ForeignGame::new("rooms", 1, |_: &mut App| {})
+        .keys([vec![], vec![KeyCode::Space]])
+        .observe(["nothing"], || [0.0])
+        .time_limit(3)
+        .layout(|_, level| level % 10);
+    let text = r#"(game: "rooms", train: "default:0..3", test: "default:10..20", steps: 1024, algorithm: "ppo")"#;
+    let mut experiment = parse_experiment(text, "rooms.ron".as_ref()).expect("valid");
+    let seen = |levels: &str| SeenLevels { game: "rooms".into(), levels: vec![levels.into()], ..SeenLevels::default() };
+    let measure = |experiment: &Experiment, seen: Option<SeenLevels>| {
+        let player = Player::Blind(BlindBot::Uniform);
+        let measured = pipeline::evaluate(&game, experiment, "random", &player, seen.as_ref(), 1).expect("measured");
+        (measured.levels, measured.left_out, measured.seen, measured.layouts)
+    };
+    // 10 and 20 have the layout of 0, and 11 to 13 those of 1 to 3.
+    assert_eq!(measure(&experiment, Some(seen("default:0..3"))), (6, 5, 0, Some(6)));
+    assert_eq!(measure(&experiment, None), (11, 0, 0, Some(10)));
+    assert_eq!(measure(&experiment, Some(seen("default:0..9"))), (11, 0, 11, Some(10)), "there are no others");
+    experiment.eval.include_seen = true;
+    assert_eq!(measure(&experiment, Some(seen("default:0..3"))), (11, 0, 5, Some(10)));
 }
 
 #[test]
@@ -192,7 +216,7 @@ fn each_step_says_what_it_cannot_do() {
 
     let elsewhere = Experiment { test: levels("plian:8..15"), ..experiment(&path) };
     let player = Player::Blind(BlindBot::Uniform);
-    let error = pipeline::evaluate(&Shown, &elsewhere, "random", &player, 1).expect_err("no such mode");
+    let error = pipeline::evaluate(&Shown, &elsewhere, "random", &player, None, 1).expect_err("no such mode");
     assert!(matches!(error, PipelineError::Experiment(_)) && error.to_string().contains("plain"), "{error}");
 }
 

@@ -77,7 +77,11 @@ fn result(trainer: &Trainer) -> StudyResult {
             success: None,
             episodic_return: None,
         }),
+        left_out: Vec::new(),
+        with_seen: None,
         test: TestResult {
+            layouts: None,
+            seen: 0,
             episodes: 1,
             success: 0.0,
             success_se: 0.0,

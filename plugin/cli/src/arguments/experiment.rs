@@ -252,6 +252,11 @@ pub(crate) fn option<T: Display>(key: &str, value: &Option<T>) -> Option<String>
     value.as_ref().map(|value| format!("{key}={value}"))
 }
 
+/// Returns the setting of `--include-seen`, if it is given.
+pub(crate) fn include_seen(is_given: bool) -> Option<String> {
+    is_given.then(|| "eval.include_seen=true".to_owned())
+}
+
 /// Returns the folder of this library's sources at build time. The program's sources are there only if it was built
 /// with them: a game elsewhere has its own.
 fn sources() -> &'static Path {

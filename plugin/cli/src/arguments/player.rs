@@ -290,9 +290,10 @@ impl Measured {
         let summary = self.summary;
         ResultRow {
             method: summary.method,
-            split: match summary.left_out {
-                0 => summary.split,
-                left_out => format!("{} without {left_out}", summary.split),
+            split: match (summary.left_out, summary.seen) {
+                (0, 0) => summary.split,
+                (0, seen) => format!("{} with {seen} seen", summary.split),
+                (left_out, _) => format!("{} without {left_out}", summary.split),
             },
             episodes: summary.episodes as usize,
             return_mean: summary.return_mean,
@@ -400,13 +401,13 @@ impl<'a> MeasuredLevels<'a> {
     }
 
     /// Checks that the policy in `path` has not learned from these levels. Levels that were named are only reported, and
-    /// so are levels of a layout that it has seen under another number.
+    /// so are levels of a layout that it has seen under another number. Returns the number of levels that it knows.
     ///
     /// # Errors
     ///
     /// It has seen held-out levels.
-    pub fn check(&mut self, path: &Path, seen: Option<&SeenLevels>) -> Result<(), CliError> {
-        let path = path.display();
+    pub fn check(&mut self, path: &Path, seen: Option<&SeenLevels>) -> Result<u64, CliError> {
+        let (path, mut known) = (path.display(), 0);
         for measured in &mut self.splits {
             let split = measured.levels.split();
             if let Some(own) = measured.levels.shown_by(seen) {
@@ -431,9 +432,10 @@ impl<'a> MeasuredLevels<'a> {
                     measured.levels.split()
                 );
             }
+            known += own.len() as u64;
             measured.known.extend(own);
         }
-        Ok(())
+        Ok(known)
     }
 
     /// Returns the levels of each range that some player knows.

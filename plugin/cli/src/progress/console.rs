@@ -162,6 +162,11 @@ impl RunObserver for Console<'_> {
                 interrupt::leave(format!("the last checkpoint of {} is that of step {step}", run.display()));
             }
             RunEvent::TrainingEnded => self.end_bar(),
+            RunEvent::KnownLevels { test, known, is_measured } => {
+                let what = if is_measured { "measured apart" } else { "left out" };
+                let levels = counted(known, "level");
+                report!("{what} of {test}: {levels} of a layout that some run trains on or learns from recordings of");
+            }
             RunEvent::Measured(summary) => {
                 self.end_shared_bar();
                 report_clipped(summary);

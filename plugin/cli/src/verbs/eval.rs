@@ -3,7 +3,7 @@
 use crate::{
     arguments::{
         Compute, check_start, default_held_out,
-        experiment::{ExperimentArgs, option},
+        experiment::{ExperimentArgs, include_seen, option},
         first_levels, name_in_list, open, player,
         player::{LoadedPlayer, MeasuredLevels, action_draw, check_run_of, check_skills},
     },
@@ -17,6 +17,7 @@ use playbot_harness::{
     eval::{AtLeast, EvalPlan, Player},
     game::Game,
     games::{Artifact, Games},
+    held_out::HeldOut,
     mode::ModeError,
     split::LevelSplit,
 };
@@ -29,9 +30,9 @@ use std::{
 
 /// Measure policies and baselines, every level equally often.
 ///
-/// Measured are trained runs, behaviour cloning, policy files and bots, on the held-out levels. The table's ± is one
-/// standard error of the mean return over levels. More levels make it smaller, more episodes on the same levels make
-/// little difference.
+/// Measured are trained runs, behaviour cloning, policy files and bots, on the held-out levels. Those of a layout that a
+/// player has learned from, under any number or as a file, are left out and counted. The table's ± is one standard error
+/// of the mean return over levels. More levels make it smaller, more episodes on the same levels make little difference.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot eval --run runs/first
@@ -42,6 +43,7 @@ use std::{
   playbot eval --run runs/pixels --observation camera
   playbot eval --run runs/first --bot random --levels MODE:64..66 --plot where.png
   playbot eval --run runs/first --bot BOT --levels MODE:64..127 --levels MODE:500..599
+  playbot eval --run runs/first --include-seen
   playbot eval --policy bot.policy --at-least success=0.9 --at-least return=8")]
 pub struct Args {
     /// Folder of a run (repeatable).
@@ -67,10 +69,13 @@ pub struct Args {
     /// policy file is of another game than the experiment.
     #[arg(long, visible_alias = "level")]
     levels: Vec<LevelSplit>,
-    /// Leave out levels of a layout that some player has learned from, under any number. Held-out levels are always
-    /// measured so.
+    /// Leave out levels of a layout that some player has learned from, under any number. Held-out levels are measured so
+    /// by default.
     #[arg(long)]
     new_layouts: bool,
+    /// Measure held-out levels of a layout that some player has learned from with the others. Rows count them.
+    #[arg(long, conflicts_with = "new_layouts")]
+    include_seen: bool,
     /// Episodes on each level, instead of the experiment's.
     #[arg(long, visible_alias = "episodes")]
     episodes_per_level: Option<u32>,
@@ -124,17 +129,17 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     splits.iter().try_for_each(|split| plan_of(split).check_memory())?;
     check_start(game, &splits[0].mode, splits[0].first)?;
     let (players, known) = players(game, &experiment, &splits, &args, games)?;
-    let left_out = left_out(&splits, known, &args)?;
+    let known = known_levels(game, &splits, known, &args, experiment.eval.include_seen)?;
     let kept = if args.json { KEPT_LINES } else { KEPT_NOTHING };
     interrupt::leave(kept.to_owned());
     let measuring = NothingToSave::listen();
     let mut footprints = args.plot.as_deref().map(|path| Footprints::new(path, game, &splits)).transpose()?;
     let (mut rows, mut shortfalls) = (Vec::new(), Vec::new());
-    for (split, left_out) in splits.iter().zip(&left_out) {
+    for (split, known) in splits.iter().zip(&known) {
         for LoadedPlayer { name, player, observation_config, .. } in &players {
             let observation_config = *observation_config;
-            let plan = EvalPlan { observation_config, left_out: left_out.clone(), ..plan_of(split) };
-            let measured = match &mut footprints {
+            let plan = EvalPlan { observation_config, left_out: known.left_out.clone(), ..plan_of(split) };
+            let mut measured = match &mut footprints {
                 Some(footprints) => {
                     let (measured, trails) = player::follow(game, name, player, &plan)?;
                     footprints.add(game, split, name, trails);
@@ -142,6 +147,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
                 }
                 None => player::measure(game, name, player, &plan)?,
             };
+            (measured.summary.seen, measured.summary.layouts) = (known.measured, known.layouts);
             if args.json {
                 player::print_json(&measured.summary)?;
             }
@@ -161,24 +167,51 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     Ok(if shortfalls.is_empty() { Outcome::Pass } else { Outcome::Findings })
 }
 
-/// Returns the levels of each range that are not measured: of held-out levels, and with --new-layouts of any, those that
-/// some player knows. All players are measured on the same levels.
-fn left_out(splits: &[LevelSplit], known: Vec<BTreeSet<u64>>, args: &Args) -> Result<Vec<BTreeSet<u64>>, CliError> {
-    let keeps_all = !args.levels.is_empty() && !args.new_layouts;
+/// The levels of a range that some player knows.
+struct KnownLevels {
+    /// Those that are not measured.
+    left_out: BTreeSet<u64>,
+    /// The number of those that are measured.
+    measured: u64,
+    /// Different layouts of the measured levels, if the game hashes them.
+    layouts: Option<u64>,
+}
+
+/// Decides whether known levels are measured: not if they are held out, and with --new-layouts in no range. All players
+/// are measured on the same levels.
+fn known_levels(
+    game: &dyn Game,
+    splits: &[LevelSplit],
+    known: Vec<BTreeSet<u64>>,
+    args: &Args,
+    include_seen: bool,
+) -> Result<Vec<KnownLevels>, CliError> {
+    let keeps_all = !args.new_layouts && (!args.levels.is_empty() || include_seen);
     for (split, known) in splits.iter().zip(&known).filter(|(_, known)| !known.is_empty()) {
         let (is, it) = if known.len() == 1 { ("is", "it") } else { ("are", "them") };
         let levels = format!("{} of {split} {is}", counted(known.len() as u64, "level"));
-        if keeps_all {
+        if keeps_all && include_seen {
+            report!(
+                "{levels} measured with the others, though no unseen {}",
+                if known.len() == 1 { "one" } else { "ones" }
+            );
+        } else if keeps_all {
             report!("{levels} measured with the others: --new-layouts leaves {it} out");
         } else if known.len() as u64 == split.len() {
+            let or_all = if args.levels.is_empty() { ", or measure them with --include-seen" } else { "" };
             return Err(CliError::Usage(format!(
-                "the players know every one of the levels {split}: name others with --levels"
+                "the players know every one of the levels {split}: name others with --levels{or_all}"
             )));
         } else {
             report!("{levels} left out");
         }
     }
-    Ok(if keeps_all { vec![BTreeSet::new(); splits.len()] } else { known })
+    let of_range = |(split, known): (_, BTreeSet<u64>)| {
+        let (left_out, measured) = if keeps_all { (BTreeSet::new(), known.len() as u64) } else { (known, 0) };
+        let layouts = HeldOut::levels_of(game, split).different(&left_out);
+        KnownLevels { left_out, measured, layouts }
+    };
+    Ok(splits.iter().zip(known).map(of_range).collect())
 }
 
 /// Returns the error of levels of a mode that the game does not have. It names the games that have it.
@@ -201,7 +234,11 @@ fn read_experiment(args: &Args, games: &Games) -> Result<Experiment, CliError> {
              --observation camera or --observation raster"
         )));
     }
-    let options = [option("seed", &args.seed), option("eval.episodes_per_level", &args.episodes_per_level)];
+    let options = [
+        option("seed", &args.seed),
+        option("eval.episodes_per_level", &args.episodes_per_level),
+        include_seen(args.include_seen),
+    ];
     match (&args.from.experiment, args.run.first()) {
         (None, Some(run)) => {
             let own = RunDir::open(run)?.experiment;

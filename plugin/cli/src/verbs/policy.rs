@@ -109,14 +109,20 @@ fn export(args: &Export, games: &Games) -> Result<Outcome, CliError> {
 }
 
 /// Returns the command that measures a policy file. It uses the held-out levels of the policy's training, if the game
-/// has them and the policy has seen none of them.
+/// has them and the policy has seen none of them, but for those whose layouts it has seen.
 fn measuring(path: &Path, game: &dyn Game, test: &LevelSplit, file: &PolicyFile) -> String {
     let command = format!("{} eval --policy {}", program::name(), quoted(&path.to_string_lossy()));
     if test.check(game).is_err() {
         return format!("`{command}`");
     }
-    match HeldOut::new(game, test).shown_by(file.metadata.seen.as_ref()) {
-        None => format!("`{command} --levels {}`", quoted(&test.to_string())),
+    let (held_out, seen) = (HeldOut::new(game, test), file.metadata.seen.as_ref());
+    match held_out.shown_by(seen) {
+        None => {
+            // Without layouts levels would have to be played.
+            let knows = |seen| !held_out.layouts().is_empty() && !held_out.seen_in(seen, &|_, _| {}).is_empty();
+            let but = if seen.is_some_and(knows) { " --new-layouts" } else { "" };
+            format!("`{command} --levels {}{but}`", quoted(&test.to_string()))
+        }
         Some(seen) => {
             format!(
                 "`{command} --levels MODE:FIRST..LAST`, on levels that it has not learned from, as it has from {seen}"

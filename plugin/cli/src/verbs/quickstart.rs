@@ -7,7 +7,7 @@ mod report;
 use crate::{
     arguments::{
         Threads, check_start_and_steps,
-        experiment::{ExperimentArgs, option},
+        experiment::{ExperimentArgs, include_seen, option},
         number_of_steps, player, revision,
     },
     error::{CliError, Outcome},
@@ -55,8 +55,8 @@ const SKILLS: &str = "skills.safetensors";
 /// Learn skills, train SCORE-PPO and PPO, test both on unseen levels, write a report.
 ///
 /// Both train for the same number of steps on the experiment's training levels, with its recordings. Behaviour cloning
-/// and the blind baselines are measured beside them, on levels that none of them has seen. The steps to success, at
-/// which a method mostly succeeds, are measured with further seeds, which train only that long.
+/// and the blind baselines are measured beside them, on levels of layouts that none of them has seen. The steps to
+/// success, at which a method mostly succeeds, are measured with further seeds, which train only that long.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot
@@ -84,6 +84,9 @@ pub struct Args {
     epochs: Option<usize>,
     #[command(flatten)]
     threads: Threads,
+    /// Measure held-out levels of a layout that was trained on or recorded with the others, instead of leaving them out.
+    #[arg(long)]
+    include_seen: bool,
     /// One line of JSON per method instead of a table.
     #[arg(long)]
     json: bool,
@@ -98,6 +101,7 @@ impl Default for Args {
             seeds: SEEDS,
             steps: None,
             epochs: None,
+            include_seen: false,
             threads: Threads::default(),
             json: false,
         }
@@ -140,12 +144,16 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let mut players: Vec<_> = trained.iter().map(|one| (one.algorithm.name().to_owned(), one.player.clone())).collect();
     players.push(("bc".to_owned(), behaviour_cloning(&skills, &experiment, draw)));
     players.extend(game.tools().bots.blind_bots().into_iter().map(|(name, bot)| (name.to_owned(), Player::Blind(bot))));
-    let left_out = known_levels(game, &experiment, &skills);
+    let known = known_levels(game, &experiment, &skills);
+    let keeps_all = experiment.eval.include_seen || known.len() as u64 == experiment.test.len();
+    let (left_out, seen) = if keeps_all { (BTreeSet::new(), known.len() as u64) } else { (known, 0) };
+    let layouts = HeldOut::levels_of(game, &experiment.test).different(&left_out);
     let mut rows = Vec::new();
     for (name, player) in &players {
         let all = experiment.eval_plan(&experiment.test, args.threads.count());
         let plan = EvalPlan { left_out: left_out.clone(), ..all };
-        let measured = player::measure(game, name, player, &plan)?;
+        let mut measured = player::measure(game, name, player, &plan)?;
+        (measured.summary.seen, measured.summary.layouts) = (seen, layouts);
         if args.json {
             let mut line = json!(measured.summary);
             if let Some(one) = first.iter().find(|one| one.algorithm.name() == name) {
@@ -176,15 +184,15 @@ fn known_levels(game: &dyn Game, experiment: &Experiment, skills: &SkillModel) -
     seen.extend(skills.demos().unwrap_or(&SeenLevels::default()));
     let held_out = HeldOut::new(game, &experiment.test);
     let known = progress::comparing(|progress| held_out.seen_in(&seen, progress));
-    // Without a new level the known ones are better than none.
-    if known.is_empty() || known.len() as u64 == experiment.test.len() {
-        return BTreeSet::new();
+    let (test, levels) = (&experiment.test, counted(known.len() as u64, "level"));
+    let of_layout = "of a layout that was recorded or trained on under another number";
+    match known.len() as u64 {
+        0 => {}
+        // Without a new level the known ones are better than none.
+        all if all == test.len() => report!("warning: each of the held-out levels {test} is {of_layout}"),
+        _ if experiment.eval.include_seen => report!("measured with the others of {test}: {levels} {of_layout}"),
+        _ => report!("left out of {test}: {levels} {of_layout}"),
     }
-    report!(
-        "left out of {}: {} of a layout that was recorded or trained on under another number",
-        experiment.test,
-        counted(known.len() as u64, "level")
-    );
     known
 }
 
@@ -208,7 +216,12 @@ struct CurvePoint {
 fn read_experiment(args: &Args, games: &Games) -> Result<Experiment, CliError> {
     Ok(args.from.load(
         games,
-        [option("seed", &args.seed), option("steps", &args.steps), option("skills.epochs", &args.epochs)],
+        [
+            option("seed", &args.seed),
+            option("steps", &args.steps),
+            option("skills.epochs", &args.epochs),
+            include_seen(args.include_seen),
+        ],
     )?)
 }
 

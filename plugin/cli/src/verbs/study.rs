@@ -3,7 +3,7 @@
 use crate::{
     arguments::{
         Compute, check_start,
-        experiment::{ExperimentArgs, Options, in_words, quoted, report_unread, sets_key},
+        experiment::{ExperimentArgs, Options, in_words, include_seen, quoted, report_unread, sets_key},
         revision,
     },
     error::{CliError, Outcome},
@@ -35,14 +35,16 @@ use std::{
 
 /// Compare variants of an experiment over several seeds.
 ///
-/// Every variant with every seed learns skills, trains, and is measured on the held-out levels. The tables and the plot
-/// do not depend on the machine: the same study gives the same files. Only cost.md reports time.
+/// Every variant with every seed learns skills, trains, and is measured on the held-out levels. Those of a layout that
+/// some run trains on, or learns from recordings of, are left out for all runs, and counted. The tables and the plot do
+/// not depend on the machine: the same study gives the same files. Only cost.md reports time.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot study GAME --seeds 1,2,3 --out study
   playbot study --experiment my.ron --out study
   playbot study --experiment my.ron --seeds 1,2,3,4,5 --set steps=200000 --out study
   playbot study --experiment my.ron --variant full --variant no-kl --out study
+  playbot study --experiment my.ron --include-seen --out study
   playbot study --experiment my.ron --seeds 1,2,3,4,5 --set steps=200000 --out study --resume
   playbot study --out study --rewrite")]
 pub struct Args {
@@ -54,6 +56,9 @@ pub struct Args {
     /// Random seeds, instead of the experiment's.
     #[arg(long, value_delimiter = ',')]
     seeds: Vec<u64>,
+    /// Also measure the held-out levels that are left out otherwise, and add a table of all levels.
+    #[arg(long)]
+    include_seen: bool,
     /// Folder for table.md, experiment.ron, curves.svg, results.json and cost.md, which are replaced.
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
@@ -67,7 +72,10 @@ pub struct Args {
     #[arg(long, conflicts_with = "resume")]
     force: bool,
     /// Run nothing. Write table.md and experiment.ron anew from the results.json in the folder.
-    #[arg(long, conflicts_with_all = ["game", "experiment", "set", "variant", "seeds", "runs", "resume", "force", "json"])]
+    #[arg(
+        long,
+        conflicts_with_all = ["game", "experiment", "set", "variant", "seeds", "include_seen", "runs", "resume", "force", "json"]
+    )]
     rewrite: bool,
     #[command(flatten)]
     compute: Compute,
@@ -83,7 +91,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         return Ok(Outcome::Pass);
     }
     let seeds = (!args.seeds.is_empty()).then(|| format!("seeds={:?}", args.seeds));
-    let mut experiment = args.from.load(games, [seeds])?;
+    let mut experiment = args.from.load(games, [seeds, include_seen(args.include_seen)])?;
     keep(&mut experiment, &args.variant)?;
     let runs = study_runs(&experiment)?;
     check_games(&runs, &args.from, games)?;
@@ -132,6 +140,10 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         report.results.iter().try_for_each(|result| print_line(json!(result)))?;
     } else {
         print_line(report.summary().trim_end())?;
+        let with_seen = report.with_seen();
+        if !with_seen.is_empty() {
+            print_line(format!("\n{}", with_seen.trim_end()))?;
+        }
     }
     report!("written to {}: table.md, experiment.ron, curves.svg, results.json, cost.md", args.out.display());
     Ok(Outcome::Pass)
@@ -189,6 +201,7 @@ impl RunObserver for StudyConsole {
     fn observe(&mut self, event: RunEvent<'_>) {
         let Some(whole) = &self.whole else { return self.console.observe(event) };
         match event {
+            RunEvent::KnownLevels { .. } => whole.suspend(|| self.console.observe(event)),
             RunEvent::StudyRunBegun { index, run } => {
                 whole.set_message(format!("run {} of {}", index + 1, self.runs));
                 self.console.set_title(run.id());
@@ -328,6 +341,10 @@ fn command(args: &Args) -> String {
     if !args.seeds.is_empty() {
         push("seeds", args.seeds.iter().map(u64::to_string).collect::<Vec<_>>().join(","));
     }
+    if args.include_seen {
+        words.push("--include-seen".to_owned());
+    }
+    let mut push = |name: &str, value: String| words.push(format!("--{name} {}", quoted(&value)));
     if args.compute.device() != DeviceKind::default() {
         push("device", args.compute.device().to_string());
     }

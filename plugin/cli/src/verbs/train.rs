@@ -23,7 +23,7 @@ use playbot_harness::{
     level_audit::{EqualLevels, levels_in_until},
     split::LevelSplit,
 };
-use playbot_learner::SkillModel;
+use playbot_learner::{SeenLevels, SkillModel};
 use playbot_report::{counted, whole};
 use playbot_train::{
     Algorithm, Experiment, LearnerKind, TrainError,
@@ -186,37 +186,44 @@ fn start(
             experiment.test
         );
     }
-    equal_layouts(game, &experiment.train, &experiment.test).iter().for_each(|words| report!("{words}"));
+    let seen = training.trainer.seen();
+    equal_layouts(game, &experiment.train, &experiment.test, seen).iter().for_each(|words| report!("{words}"));
     Ok(training)
 }
 
 /// Largest number of levels of a range whose layouts are compared before a training, so that it begins at once.
 const MOST_COMPARED: u64 = 10_000;
 
-/// Describes how many training levels are equal, and how many held-out levels are equal to training levels. `None` if
-/// neither is the case, or is not known at once: without layouts, levels would have to be played.
-fn equal_layouts(game: &dyn Game, train: &LevelSplit, test: &LevelSplit) -> Option<String> {
+/// Describes how many training levels are equal, and how many held-out levels are equal to those that are `seen` in
+/// training and in recordings. `None` if neither is the case, or is not known at once: without layouts, levels would have
+/// to be played.
+fn equal_layouts(game: &dyn Game, train: &LevelSplit, test: &LevelSplit, seen: Option<&SeenLevels>) -> Option<String> {
     if train.len() > MOST_COMPARED {
         return None;
     }
-    let trained = HeldOut::levels_of(game, train);
+    let (trained, held_out) = (HeldOut::levels_of(game, train), HeldOut::new(game, test));
     let equal = EqualLevels::of_layouts(trained.layouts().clone())?;
-    let known = match test.len() <= MOST_COMPARED && !is_only_level(game, &test.mode) {
-        true => levels_in_until(test, &trained, &|| false).len(),
-        false => 0,
-    };
+    let is_known_at_once =
+        test.len() <= MOST_COMPARED && !is_only_level(game, &test.mode) && !held_out.layouts().is_empty();
+    let known = if is_known_at_once { levels_in_until(test, &trained, &|| false).len() } else { 0 };
+    let seen = seen.filter(|_| is_known_at_once).map_or(known, |seen| held_out.seen_in(seen, &|_, _| {}).len());
     let layouts = counted(equal.layouts, "layout");
     let of_training = format!("the {} {train} have {layouts}", counted(train.len(), "training level"));
-    let all = whole(test.len() as f64);
-    match (equal.groups.is_empty(), known) {
-        (true, 0) => None,
-        (false, 0) => Some(of_training),
-        (true, known) => {
-            Some(format!("{known} of the {all} held-out levels {test} have the layout of a training level"))
+    let of_held_out = |count: usize| format!("{count} of the {} held-out levels {test} have", whole(test.len() as f64));
+    let held_out = match (equal.groups.is_empty(), known) {
+        _ if seen.max(known) == 0 => None,
+        (_, 0) => Some(format!("{} the layout of a recorded level", of_held_out(seen))),
+        (true, _) if seen > known => {
+            Some(format!("{} the layout of a training level or of a recorded one", of_held_out(seen)))
         }
-        (false, known) => {
-            Some(format!("{of_training}, and {known} of the {all} held-out levels {test} have one of these"))
-        }
+        (true, known) => Some(format!("{} the layout of a training level", of_held_out(known))),
+        (false, _) if seen > known => Some(format!("{} one of these or that of a recorded level", of_held_out(seen))),
+        (false, known) => Some(format!("{} one of these", of_held_out(known))),
+    };
+    match (equal.groups.is_empty(), held_out) {
+        (true, held_out) => held_out,
+        (false, None) => Some(of_training),
+        (false, Some(held_out)) => Some(format!("{of_training}, and {held_out}")),
     }
 }
 
@@ -306,7 +313,7 @@ mod tests {
     fn a_training_reports_equal_levels_of_its_ranges_if_there_are_any() {
         let game = |modulo: u64| ForeignGame::new("rooms", 1, |_: &mut App| {}).layout(move |_, level| level % modulo);
         let words = |game: &ForeignGame, train: &str, test: &str| {
-            equal_layouts(game, &train.parse().expect("levels"), &test.parse().expect("levels"))
+            equal_layouts(game, &train.parse().expect("levels"), &test.parse().expect("levels"), None)
         };
         let (train, test) = ("default:0..7", "default:8..13");
         assert_eq!(
@@ -338,5 +345,30 @@ mod tests {
             "it is measured on the level it trains on"
         );
         assert_eq!(words(&ForeignGame::new("rooms", 1, |_: &mut App| {}), train, test), None, "it has no layouts");
+    }
+
+    #[test]
+    fn a_training_reports_held_out_levels_whose_layouts_were_recorded() {
+        let game = |modulo: u64| ForeignGame::new("rooms", 1, |_: &mut App| {}).layout(move |_, level| level % modulo);
+        let words = |game: &ForeignGame, train: &str, levels: &[&str]| {
+            let levels = levels.iter().map(|&range| range.to_owned()).collect();
+            let seen = SeenLevels { game: "rooms".to_owned(), levels, ..SeenLevels::default() };
+            let (train, test) = (train.parse().expect("levels"), "default:100..109".parse().expect("levels"));
+            equal_layouts(game, &train, &test, Some(&seen))
+        };
+        let (train, test) = ("default:0..3", "10 held-out levels default:100..109");
+        assert_eq!(words(&game(1000), train, &["default:0..3", "default:20..30"]), None);
+        assert_eq!(
+            words(&game(50), "default:10..13", &["default:10..13", "default:2..3"]),
+            Some(format!("2 of the {test} have the layout of a recorded level"))
+        );
+        assert_eq!(
+            words(&game(50), train, &[train, "default:58..59"]),
+            Some(format!("6 of the {test} have the layout of a training level or of a recorded one"))
+        );
+        let twice = words(&game(50), "default:0..50", &["default:0..50", "default:1000..1002"]);
+        assert!(twice.as_ref().is_some_and(|words| words.ends_with(&format!("10 of the {test} have one of these"))));
+        let some = words(&game(4).layout(|_, level| level.max(2) % 109), "default:0..2", &["default:108..108"]);
+        assert!(some.as_ref().is_some_and(|words| words.ends_with("have the layout of a recorded level")), "{some:?}");
     }
 }

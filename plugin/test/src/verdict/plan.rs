@@ -18,6 +18,7 @@ use playbot_harness::{
     split::LevelSplit,
     worlds::Arrangement,
 };
+use playbot_report::counted;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -253,6 +254,13 @@ pub struct TesterRecord {
     /// The policy's run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub run: Option<TestedRun>,
+    /// Levels of the tested range that the policy has learned from: by number, as a file, by their layout or their play.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub known: u64,
+}
+
+fn is_zero(count: &u64) -> bool {
+    *count == 0
 }
 
 /// A checkpoint of a run.
@@ -264,7 +272,7 @@ pub struct TestedRun {
     pub step: u64,
 }
 
-/// The path of a policy's file does not identify the tester.
+/// Neither the path of a policy's file nor the levels that it knows identify the tester.
 impl PartialEq for TesterRecord {
     fn eq(&self, other: &Self) -> bool {
         (&self.name, &self.checksum, self.greedy) == (&other.name, &other.checksum, other.greedy)
@@ -276,7 +284,7 @@ impl Eq for TesterRecord {}
 impl TesterRecord {
     /// Makes the tester of a bot of the game.
     pub fn bot(name: impl Into<String>) -> Self {
-        Self { name: name.into(), checksum: None, greedy: false, file: None, run: None }
+        Self { name: name.into(), checksum: None, greedy: false, file: None, run: None, known: 0 }
     }
 
     /// Makes the tester of a policy's file, under its own name or else the file's.
@@ -291,6 +299,12 @@ impl TesterRecord {
     pub fn describe(&self) -> String {
         let checksum = self.checksum.as_ref().map_or_else(String::new, |sum| format!(" (file {sum})"));
         format!("{}{checksum}{}", self.name, if self.greedy { ", greedy" } else { "" })
+    }
+
+    /// Describes how many of the tested levels the tester has learned from; `None` if there are none.
+    pub fn describe_known(&self) -> Option<String> {
+        let levels = counted(self.known, "level");
+        (self.known > 0).then(|| format!("{} has learned from {levels} of this test, or from equal ones", self.name))
     }
 }
 
@@ -419,6 +433,13 @@ mod tests {
         assert_ne!(here, TesterRecord { greedy: true, ..there.clone() });
         assert_ne!(here, TesterRecord { name: "bot".to_owned(), ..there.clone() });
         assert_eq!(there.describe(), "ppo (file 0f)");
+        let knowing = TesterRecord { known: 1, ..there.clone() };
+        assert_eq!((&knowing, there.describe_known()), (&here, None));
+        let words = "ppo has learned from 1 level of this test, or from equal ones";
+        assert_eq!(knowing.describe_known().as_deref(), Some(words));
+        let text = serde_json::to_string(&[knowing, there.clone()]).expect("JSON");
+        assert_eq!(text.matches("known").count(), 1, "{text}");
+        assert_eq!(serde_json::from_str::<Vec<TesterRecord>>(&text).expect("JSON")[0].known, 1);
         let text = serde_json::to_string(&there).expect("JSON");
         assert_eq!(text, r#"{"name":"ppo","checksum":"0f","file":"runs/new.policy"}"#);
         assert_eq!(serde_json::to_string(&here).expect("JSON"), r#"{"name":"ppo","checksum":"0f"}"#);

@@ -145,6 +145,10 @@ pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, prog
         let (levels, episodes, places) = (share(tester.levels), share(tester.episodes), tester.places.describe());
         lines.push(format!("| {} | {levels} | {episodes} | {places} |", markdown_cell(&tester.name)));
     }
+    let known: Vec<String> = record.testers.iter().filter_map(TesterRecord::describe_known).collect();
+    if !known.is_empty() {
+        lines.extend([String::new(), format!("{}.", markdown_cell(&known.join("; ")))]);
+    }
     if let Some(comparison) = comparison {
         lines.extend(compared(comparison, comparable_command(program, record, comparison)));
     }

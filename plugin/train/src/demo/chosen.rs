@@ -1,7 +1,11 @@
 //! The selection of recorded episodes to learn from.
 
 use crate::demo::Demonstrations;
-use playbot_harness::{demo::VerifyError, game::Game, split::LevelSplit};
+use playbot_harness::{
+    demo::VerifyError,
+    game::{Game, level_designs},
+    split::LevelSplit,
+};
 use playbot_learner::{SeenLevels, Streams, rng::shuffle};
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -43,14 +47,26 @@ impl Demonstrations {
         self
     }
 
-    /// Returns the levels that the demonstrations show.
+    /// Returns the levels that the demonstrations show. Recordings keep the hashes of files and not their layouts, so the
+    /// layouts are those of the files that are still there.
     pub fn seen_levels(&self, game: &dyn Game) -> SeenLevels {
         let (mut levels, mut files) = (BTreeMap::<&str, BTreeSet<u64>>::new(), BTreeSet::new());
+        let mut modes_of_files = BTreeSet::<&str>::new();
         for demo in &self.episodes {
             match &demo.episode.level_file {
-                Some(file) => files.insert(file.hash),
-                None => levels.entry(&demo.mode).or_default().insert(demo.episode.level_seed),
-            };
+                Some(file) => {
+                    files.insert(file.hash);
+                    modes_of_files.insert(&demo.mode);
+                }
+                None => {
+                    levels.entry(&demo.mode).or_default().insert(demo.episode.level_seed);
+                }
+            }
+        }
+        let mut layouts = BTreeSet::new();
+        for designs in modes_of_files.iter().filter_map(|mode| level_designs(game, mode).ok()) {
+            let is_recorded = |level: &u64| designs.hash(*level).is_some_and(|hash| files.contains(&hash));
+            layouts.extend((0..designs.count()).filter(is_recorded).filter_map(|level| designs.layout(level)));
         }
         let ranges = levels
             .into_iter()
@@ -59,8 +75,7 @@ impl Demonstrations {
             game: game.name().to_owned(),
             levels: ranges.map(|range| range.to_string()).collect(),
             level_files: files.into_iter().collect(),
-            // Recordings keep the hashes of files, and not their layouts.
-            layouts: Vec::new(),
+            layouts: layouts.into_iter().collect(),
         }
     }
 }

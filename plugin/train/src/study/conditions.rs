@@ -6,7 +6,7 @@ use crate::{
 };
 use playbot_harness::split::LevelSplit;
 use playbot_learner::brief_number;
-use playbot_report::number::{fixed, times};
+use playbot_report::number::{fixed, times, whole};
 
 impl StudyReport {
     /// Returns the conditions of the study as a paragraph of Markdown.
@@ -23,14 +23,35 @@ impl StudyReport {
             }
         };
         format!(
-            "{}. Measured on {}, each level {}. {}. Training figures are those of the last 100 episodes, or of all \
+            "{}. {}. {}. Training figures are those of the last 100 episodes, or of all \
              where there were fewer. The steps are those until their success rate first was {}.",
             self.trainings(),
-            experiment.test,
-            times(experiment.eval.episodes_per_level),
+            self.measured_levels(),
             over,
             rate_cell(experiment.study.threshold),
         )
+    }
+
+    /// Describes the levels of the measurement, their layouts, and those that are left out.
+    fn measured_levels(&self) -> String {
+        let Experiment { test, eval, .. } = &self.experiment;
+        let (each, left_out) = (times(eval.episodes_per_level), self.known_levels().len() as u64);
+        let test_result = self.results.first().map(|run| &run.test);
+        let is_known = test_result.is_some_and(|result| result.seen > 0);
+        let unseen = if is_known { ". Some run of the study knows each of them: none is new" } else { "" };
+        let layouts = test_result.and_then(|result| result.layouts);
+        let layouts = layouts.map(|layouts| count_of(layouts, "different layout"));
+        let levels = count_of(test.len().saturating_sub(left_out), "level");
+        match (left_out, layouts) {
+            (0, None) => format!("Measured on {test}, each level {each}{unseen}"),
+            (0, Some(layouts)) => format!("Measured on {test}, {levels} of {layouts}, each level {each}{unseen}"),
+            (_, layouts) => format!(
+                "Measured on {levels} of {test}{}, each level {each}. {} left out, since some run of the study is trained on \
+                 their layouts or learns from recordings of them",
+                layouts.map_or_else(String::new, |layouts| format!(", which have {layouts}")),
+                count_of(left_out, "level") + if left_out == 1 { " is" } else { " are" }
+            ),
+        }
     }
 
     /// Describes the training levels and lengths of the variants: once if all are alike, else by groups of variants.
@@ -72,6 +93,11 @@ impl StudyReport {
     }
 }
 
+/// Counts things with groups of digits, as tables have them.
+pub(super) fn count_of(count: u64, what: &str) -> String {
+    if count == 1 { format!("1 {what}") } else { format!("{} {what}s", whole(count as f64)) }
+}
+
 /// Describes levels, steps and, for learners with a free number of them, gradient steps.
 fn training(run: &Experiment) -> String {
     let words = format!("{} for {} environment steps", run.train, fixed(run.whole_steps() as f64, 0));
@@ -111,7 +137,11 @@ mod tests {
             algorithm: Algorithm::Ppo,
             seed: 1,
             training: None,
+            left_out: Vec::new(),
+            with_seen: None,
             test: TestResult {
+                layouts: None,
+                seen: 0,
                 episodes: 1,
                 success: 1.0,
                 success_se: 0.0,
@@ -139,6 +169,34 @@ mod tests {
         );
         assert_eq!(title(&[elsewhere]), "corridor: success in training on plain:20..29");
         assert_eq!(title(&[("full", ""), elsewhere]), "corridor: success in training, each variant on its own levels");
+    }
+
+    #[test]
+    fn levels_that_are_left_out_and_layouts_are_counted() {
+        let measured = |layouts, left_out: &[u64]| {
+            let mut report = report(&[("full", "")]);
+            report.results[0].test.layouts = layouts;
+            report.results[0].left_out = left_out.to_vec();
+            report.measured_levels()
+        };
+        assert_eq!(measured(None, &[]), "Measured on plain:8..15, each level once");
+        assert_eq!(measured(Some(6), &[]), "Measured on plain:8..15, 8 levels of 6 different layouts, each level once");
+        assert_eq!(
+            measured(Some(4), &[9, 10, 11]),
+            "Measured on 5 levels of plain:8..15, which have 4 different layouts, each level once. 3 levels are left out, \
+             since some run of the study is trained on their layouts or learns from recordings of them"
+        );
+        let mut known = report(&[("full", "")]);
+        known.results[0].test.seen = 8;
+        assert_eq!(
+            known.measured_levels(),
+            "Measured on plain:8..15, each level once. Some run of the study knows each of them: none is new"
+        );
+        let of_play = measured(None, &[9]);
+        assert!(
+            of_play.starts_with("Measured on 7 levels of plain:8..15, each level once. 1 level is left out"),
+            "{of_play}"
+        );
     }
 
     #[test]

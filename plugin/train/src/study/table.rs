@@ -1,11 +1,12 @@
 //! Studies as Markdown: means over the seeds, the numbers of every seed, and the command to run again; and the
 //! experiment beside them.
 
-use crate::study::{StudyReport, StudyResult, TrainingResult};
+use crate::study::{StudyReport, StudyResult, TestResult, TrainingResult, conditions::count_of};
 use playbot_harness::brief::shell_word;
 use playbot_report::{
     number::{UNKNOWN, fixed, mean_and_error},
     statistics::mean_and_sd,
+    whole,
 };
 use std::{fmt::Write, path::Path};
 
@@ -24,6 +25,7 @@ impl StudyReport {
         let _ = write!(page, "```sh\n{}\n```\n\n{}\n\n{}\n", self.command, self.conditions(), self.summary());
         page += &self.differences();
         page += &self.intervals();
+        page += &self.with_seen();
         page += &self.drawn_words();
         page += "![Learning curves](curves.svg)\n\n## Each seed\n\n";
         let _ = write!(page, "± is the standard error of a measurement, over its levels.\n\n{}\n", self.every_seed());
@@ -104,6 +106,28 @@ impl StudyReport {
             ]
         });
         markdown_table(&headings, rows)
+    }
+
+    /// Returns the table of all held-out levels, with those that some run knows; empty if they were not measured.
+    pub fn with_seen(&self) -> String {
+        let rows = self.variants().into_iter().map(|variant| {
+            let runs: Option<Vec<_>> = self.of(variant).iter().map(|run| run.with_seen.as_ref()).collect();
+            let runs = runs?;
+            let values = |value: fn(&TestResult) -> f64| runs.iter().map(|test| value(test)).collect::<Vec<f64>>();
+            let (success, returns) = (values(|test| test.success), values(|test| test.return_mean));
+            Some(vec![variant.to_owned(), share_cell(&success), mean_cell(&returns, 2)])
+        });
+        let Some(rows) = rows.collect::<Option<Vec<_>>>().filter(|rows| !rows.is_empty()) else {
+            return String::new();
+        };
+        let (test, known) = (&self.experiment.test, self.known_levels().len() as u64);
+        format!(
+            "All {} of {test}, with the {} that some run knows. The figures are means ± standard deviations over the seeds, \
+             and no measure of new levels.\n\n{}\n",
+            count_of(test.len(), "level"),
+            whole(known as f64),
+            markdown_table(&["variant", "success on all", "return on all"], rows.into_iter())
+        )
     }
 
     fn every_seed(&self) -> String {
@@ -194,11 +218,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::{
-        Algorithm,
-        experiment::file::parse_experiment,
-        study::{LearningCurves, TestResult},
-    };
+    use crate::{Algorithm, experiment::file::parse_experiment, study::LearningCurves};
 
     /// Makes learning curves with points at 512 and 1,024 steps.
     fn learned(success: [f64; 2], returns: [f64; 2]) -> LearningCurves {
@@ -219,7 +239,11 @@ mod tests {
                 success: Some(success),
                 episodic_return: Some(return_mean),
             }),
+            left_out: Vec::new(),
+            with_seen: None,
             test: TestResult {
+                layouts: None,
+                seen: 0,
                 episodes: 100,
                 success,
                 success_se: (success * (1.0 - success) / 100.0f64).sqrt(),
@@ -347,6 +371,24 @@ mod tests {
         {
             assert_eq!(svg.matches(words).count(), 2, "{words}: {svg}");
         }
+    }
+
+    #[test]
+    fn known_levels_that_were_measured_have_a_table_of_their_own() {
+        let mut report = report();
+        assert_eq!(report.with_seen(), "");
+        for run in &mut report.results {
+            run.left_out = vec![9, 12];
+            run.with_seen = Some(TestResult { success: run.test.success + 0.1, return_mean: 9.0, ..run.test.clone() });
+        }
+        let page = report.to_markdown();
+        assert!(page.contains("All 8 levels of plain:8..15, with the 2 that some run knows."), "{page}");
+        let row = page.lines().find(|line| line.starts_with("| full ") && line.contains("9.00 ± 0.00"));
+        assert!(row.is_some_and(|row| row.contains("80.0 ± 14.1%")), "{page}");
+        assert!(page.contains("Measured on 6 levels of plain:8..15, each level once. 2 levels are left out"), "{page}");
+        // A table of some variants alone would compare nothing.
+        report.results[3].with_seen = None;
+        assert_eq!(report.with_seen(), "");
     }
 
     #[test]

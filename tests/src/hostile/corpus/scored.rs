@@ -173,7 +173,11 @@ fn study_result() -> StudyResult {
             success: Some(0.75),
             episodic_return: None,
         }),
+        left_out: vec![66, 70],
+        with_seen: None,
         test: TestResult {
+            layouts: Some(5),
+            seen: 3,
             episodes: 8,
             success: 0.5,
             success_se: 0.125,

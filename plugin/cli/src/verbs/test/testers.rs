@@ -56,9 +56,9 @@ impl TesterArgs {
             let path = named.as_ref().map_or(given.as_path(), |named| named.path.as_path());
             let chosen = LoadedPlayer::policy_file(game, path, draw, device)?;
             chosen.check_fit(game)?;
-            measured.check(path, chosen.seen.as_ref())?;
+            let known = measured.check(path, chosen.seen.as_ref())?;
             let name = named.as_ref().map(|named| named.name.clone());
-            let record = TesterRecord::policy(name, path, file_checksum(path)?);
+            let record = TesterRecord { known, ..TesterRecord::policy(name, path, file_checksum(path)?) };
             testers.push(self.of_policy(chosen, record));
         }
         for path in &self.run {
@@ -70,10 +70,11 @@ impl TesterArgs {
             let step = checkpoint.summary.step;
             let chosen = LoadedPlayer::run(game, &opened, CheckpointChoice::Step(step), draw, device)?;
             chosen.check_fit(game)?;
-            measured.check(path, chosen.seen.as_ref())?;
+            let known = measured.check(path, chosen.seen.as_ref())?;
             let name = path.file_name().map_or(chosen.name.clone(), |name| name.to_string_lossy().into_owned());
             let tested = Some(TestedRun { folder: path.display().to_string(), step });
-            testers.push(self.of_policy(chosen, TesterRecord { checksum, run: tested, ..TesterRecord::bot(name) }));
+            testers
+                .push(self.of_policy(chosen, TesterRecord { checksum, run: tested, known, ..TesterRecord::bot(name) }));
         }
         if testers.is_empty() {
             testers.push(of_bot(LoadedPlayer::default_of(game)?));
