@@ -140,6 +140,7 @@ mod tests {
         "ShowsWindows",
         "Stage",
         "Takeover",
+        "TasksEndWithFrames",
         "TickSchedules",
         "TileBorder",
         "TileLayer",

@@ -14,6 +14,7 @@
 //! | survive a game that panics or logs errors | [`panics`], [`system_errors`] |
 //! | name the tick in which a game logs a message | [`tick_of_thread`], [`LevelTick`] |
 //! | let frames wait for the assets of a game, and name them | [`deliver_between_frames`], [`wait_for_assets`], [`deliver_assets`], [`UnloadedAssets`] |
+//! | let frames wait for the tasks of a game | [`TasksEndWithFrames`], [`wait_for_tasks`], [`tasks_in_order`] |
 //! | name the level of a call that does not return | [`GameCall`], [`SlowCalls`], [`SlowCall`] |
 //! | decide for many agents at once | [`PolicyBatch`], [`PolicyRows`], [`SharedBatch`], [`Playing`], [`draw_skills`] |
 //! | keep systems in one order | [`put_in_order`], [`leave_open`], [`FaultSystems`], [`run_observe_schedule`] |
@@ -66,7 +67,10 @@ pub use crate::{
 // Documented here: games do not need their modules, which are private.
 pub use crate::{
     calls::{GameCall, SlowCall, SlowCalls},
-    loading::{UnloadedAssets, deliver_assets, deliver_between_frames, wait_for_assets},
+    loading::{
+        TasksEndWithFrames, UnloadedAssets, deliver_assets, deliver_between_frames, tasks_in_order, wait_for_assets,
+        wait_for_tasks,
+    },
     policy_batch::{Playing, PolicyBatch, PolicyRows, SharedBatch},
     renewal::{NextEpisode, Renewal},
 };

@@ -41,7 +41,7 @@ use crate::{
     calls::GameCall,
     episode::{Episode, Tick, with_tick},
     fault::{Fault, Faults},
-    loading::{deliver_between_frames, wait_for_assets},
+    loading::{deliver_between_frames, tasks_in_order, wait_for_assets, wait_for_tasks},
     panics,
     placement::{FrameGate, TickPlacement},
     plugin::PlaybotPlugin,
@@ -147,8 +147,9 @@ pub fn run_on_one_thread(world: &mut World) {
 
 /// Runs one tick. Under [`TickPlacement::Frame`] this may take several frames, while a level is
 /// being built. After each of these frames it waits for assets that the game has asked for, so that
-/// they are there in the next one however fast the machine is. A World with a [`Renewal`](crate::renewal::Renewal) is replaced by a new one before an
-/// episode begins in it.
+/// they are there in the next one however fast the machine is. In a World with
+/// [`TasksEndWithFrames`](crate::loading::TasksEndWithFrames) it waits for the game's tasks as well. A World with a
+/// [`Renewal`](crate::renewal::Renewal) is replaced by a new one before an episode begins in it.
 ///
 /// # Errors
 ///
@@ -196,6 +197,8 @@ fn run_frames(world: &mut World) -> Result<(), Fault> {
         world.run_schedule(Main);
         world.clear_trackers();
         if world.contains_resource::<FrameGate>() {
+            // First, since tasks may ask for assets.
+            wait_for_tasks(world);
             wait_for_assets(world);
         }
         if let Some(failure) = system_errors::take() {
@@ -311,6 +314,8 @@ pub struct HeadlessPlugins {
     draws: bool,
     /// True if the renderer's sub-app exists while plugins are built, although it draws nothing.
     shows_sub_app: bool,
+    /// True if the game's tasks run one after the other.
+    orders_tasks: bool,
 }
 
 impl HeadlessPlugins {
@@ -326,6 +331,11 @@ impl HeadlessPlugins {
     pub fn with_render_app(self) -> Self {
         Self { shows_sub_app: true, ..self }
     }
+
+    /// Lets tasks of `AsyncComputeTaskPool` run one after the other, in the order in which they are spawned.
+    pub fn with_tasks_in_order(self) -> Self {
+        Self { orders_tasks: true, ..self }
+    }
 }
 
 impl PluginGroup for HeadlessPlugins {
@@ -340,17 +350,18 @@ impl PluginGroup for HeadlessPlugins {
                     ..default()
                 },
             );
-        let plugins = bevy_parts::with_one_log(bevy_parts::without_devices(plugins)).set(one_thread_for_each_world());
+        let plugins = bevy_parts::with_one_log(bevy_parts::without_devices(plugins))
+            .set(one_thread_for_each_world(self.orders_tasks));
         if self.draws { drawing(plugins) } else { not_drawing(plugins, self.shows_sub_app) }
     }
 }
 
 /// Bevy's pools of threads, with one thread for work within a frame: its systems then loop on the thread of their World,
 /// and so in the same order on every machine.
-fn one_thread_for_each_world() -> TaskPoolPlugin {
+fn one_thread_for_each_world(orders_tasks: bool) -> TaskPoolPlugin {
     let mut options = TaskPoolOptions::default();
     (options.compute.min_threads, options.compute.max_threads) = (1, 1);
-    TaskPoolPlugin { task_pool_options: options }
+    if orders_tasks { tasks_in_order(options) } else { TaskPoolPlugin { task_pool_options: options } }
 }
 
 #[cfg(feature = "camera")]

@@ -1,7 +1,8 @@
-//! Assets that Bevy's asset server is still loading, and frames that wait for them.
+//! Assets that Bevy's asset server is still loading, tasks that still run, and frames that wait for them.
 
 use crate::carry_over::ReflectCarryResource;
 use bevy::{
+    app::{TaskPoolOptions, TaskPoolPlugin},
     asset::{AssetPath, handle_internal_asset_events, publish_asset_server_diagnostics},
     diagnostic::DiagnosticsStore,
     ecs::{
@@ -9,9 +10,16 @@ use bevy::{
         system::BoxedSystem,
     },
     prelude::*,
-    tasks::{IoTaskPool, block_on, poll_once},
+    tasks::{AsyncComputeTaskPool, IoTaskPool, block_on, futures_lite::future::yield_now, poll_once},
 };
-use std::{fmt, time::Duration};
+use std::{
+    fmt,
+    sync::{
+        Arc, Condvar, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
+    time::Duration,
+};
 
 /// Assets of a World that are not loaded, by their paths, each list in alphabetical order.
 ///
@@ -95,7 +103,7 @@ impl fmt::Display for UnloadedAssets {
     }
 }
 
-/// Looks, one a millisecond, in which no asset may arrive before the frames go on without those that are missing.
+/// Looks, one a millisecond, in which no asset may arrive, and no task end, before the frames go on without them.
 const PATIENT_LOOKS: u32 = 10_000;
 
 /// The record of loads that frames have waited for.
@@ -210,6 +218,150 @@ fn wait_for_arrivals(world: &mut World) {
     }
 }
 
+/// A mark of Worlds whose frames wait for the game's tasks: see [`wait_for_tasks`].
+#[derive(Resource, Clone, Copy, Debug, Default, Reflect)]
+#[reflect(Resource)]
+pub struct TasksEndWithFrames;
+
+/// Returns Bevy's pools of threads with these options, and one thread for tasks of `AsyncComputeTaskPool`. They then run
+/// one after the other, in the order in which they are spawned. The pools belong to the program: its first World makes
+/// them.
+pub fn tasks_in_order(mut options: TaskPoolOptions) -> TaskPoolPlugin {
+    (options.async_compute.min_threads, options.async_compute.max_threads) = (1, 1);
+    TaskPoolPlugin { task_pool_options: options }
+}
+
+/// Waits until the tasks that were spawned in Bevy's `AsyncComputeTaskPool` have run, in a World with
+/// [`TasksEndWithFrames`]. No game time passes.
+///
+/// A task has run when it has ended, or waits for something else than tasks of this pool: a file, a timer or a thread. A
+/// task that takes more than ten seconds is left behind, with a warning.
+pub fn wait_for_tasks(world: &World) {
+    /// The waits of all Worlds, which share the pool.
+    static WAITS: TaskWaits = TaskWaits::new();
+
+    if !world.contains_resource::<TasksEndWithFrames>() {
+        return;
+    }
+    let Some(pool) = AsyncComputeTaskPool::try_get() else { return };
+    WAITS.wait(pool.thread_num(), PATIENT_LOOKS, |meeting| pool.spawn(meeting.attend()).detach());
+}
+
+/// Times that all threads of a pool meet in a wait. A task that is woken by another one, or spawned by it, has run when
+/// they meet the next time.
+const ROUNDS: usize = 16;
+
+/// The meeting of a pool's threads, by a task in each of them.
+///
+/// A pool runs its tasks in the order of their queue, so a thread comes to a meeting behind all earlier tasks. Several
+/// threads stay until the last one has come: until then it may run an earlier task.
+struct Meeting {
+    threads: usize,
+    state: Mutex<MeetingState>,
+    changed: Condvar,
+}
+
+#[derive(Default)]
+struct MeetingState {
+    /// Arrivals of all rounds.
+    arrivals: usize,
+    is_over: bool,
+}
+
+impl Meeting {
+    /// Attends all rounds. Spawn it once for each thread.
+    async fn attend(self: Arc<Self>) {
+        for round in 1..=ROUNDS {
+            if self.meet(round) {
+                return;
+            }
+            // To the end of the queue.
+            yield_now().await;
+        }
+    }
+
+    /// Meets the other threads. Returns whether the meeting is over.
+    fn meet(&self, round: usize) -> bool {
+        let mut state = lock(&self.state);
+        state.arrivals += 1;
+        state.is_over |= state.arrivals == ROUNDS * self.threads;
+        if state.is_over || self.threads > 1 {
+            self.changed.notify_all();
+        }
+        let is_early = |state: &mut MeetingState| state.arrivals < round * self.threads && !state.is_over;
+        self.changed.wait_while(state, is_early).unwrap_or_else(PoisonError::into_inner).is_over
+    }
+
+    /// Waits for a look, and returns whether the meeting is over.
+    fn look(&self) -> bool {
+        let wait = self.changed.wait_timeout_while(lock(&self.state), Duration::from_millis(1), |state| !state.is_over);
+        wait.unwrap_or_else(PoisonError::into_inner).0.is_over
+    }
+
+    /// Ends the meeting before all threads have come.
+    fn end(&self) {
+        lock(&self.state).is_over = true;
+        self.changed.notify_all();
+    }
+}
+
+/// The waits for the tasks of one pool.
+struct TaskWaits {
+    /// Held by the only World that waits, where a pool has several threads: two meetings would wait for each other's.
+    turn: Mutex<()>,
+    /// Meetings that were held.
+    met: AtomicU64,
+    /// The meeting that a thread has missed, since a task did not end in time.
+    missed: Mutex<Option<Arc<Meeting>>>,
+}
+
+impl TaskWaits {
+    const fn new() -> Self {
+        Self { turn: Mutex::new(()), met: AtomicU64::new(0), missed: Mutex::new(None) }
+    }
+
+    /// Waits until a pool with so many threads has run its tasks, but only for this many looks in which no wait of any
+    /// World ends. `spawn` puts a task at the end of the pool's queue that attends a meeting.
+    fn wait(&self, threads: usize, patience: u32, spawn: impl Fn(Arc<Meeting>)) {
+        let _turn = (threads > 1).then(|| lock(&self.turn));
+        let mut patience = patience;
+        if let Some(missed) = &*lock(&self.missed) {
+            // Its tasks still wait in the queue, behind the one that does not end.
+            if Arc::strong_count(missed) > 1 {
+                return;
+            }
+            // Other threads have run them, so it may not have ended yet.
+            patience = if threads > 1 { 1 } else { patience };
+        }
+        let meeting = Arc::new(Meeting { threads, state: Mutex::default(), changed: Condvar::new() });
+        for _ in 0..threads {
+            spawn(meeting.clone());
+        }
+        let (mut met, mut looks) = (self.met.load(Ordering::Relaxed), 0);
+        while looks < patience {
+            run_tasks();
+            if meeting.look() {
+                self.met.fetch_add(1, Ordering::Relaxed);
+                *lock(&self.missed) = None;
+                return;
+            }
+            let before = std::mem::replace(&mut met, self.met.load(Ordering::Relaxed));
+            looks = if met == before { looks + 1 } else { 0 };
+        }
+        meeting.end();
+        if lock(&self.missed).replace(meeting).is_none() {
+            tracing::warn!(
+                "a task of `AsyncComputeTaskPool` has not ended for ten seconds, and the game goes on without it; no \
+                 frame waits for tasks until it ends"
+            );
+        }
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// Runs tasks that belong to this thread: those of the program's main loop, and without Bevy's feature
 /// `multi_threaded` all of them.
 fn run_tasks() {
@@ -228,15 +380,24 @@ fn run_tasks() {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use async_executor::Executor;
     use bevy::{
-        app::TaskPoolPlugin,
         asset::{
             AssetLoader, LoadContext,
             io::{AssetReader, AssetReaderError, AssetSourceBuilder, PathStream, Reader, VecReader},
         },
         image::ImageLoader,
+        tasks::futures_lite,
     };
-    use std::path::Path;
+    use futures_lite::future::{block_on, pending};
+    use std::{
+        cell::Cell,
+        future::poll_fn,
+        path::Path,
+        sync::mpsc,
+        task::{Poll, Waker},
+        thread,
+    };
 
     #[derive(Asset, TypePath)]
     struct Tiles;
@@ -362,5 +523,179 @@ mod tests {
         wait_for_assets(&mut world);
         assert!(UnloadedAssets::of(&world).is_empty());
         assert!(!world.contains_resource::<AwaitedLoads>());
+    }
+
+    /// A pool as Bevy has it with its feature `multi_threaded`, without which this crate is tested. Its threads end with
+    /// the program.
+    struct Pool {
+        executor: Arc<Executor<'static>>,
+        threads: usize,
+        waits: TaskWaits,
+    }
+
+    impl Pool {
+        fn new(threads: usize) -> Self {
+            let executor = Arc::new(Executor::new());
+            for _ in 0..threads {
+                let executor = executor.clone();
+                thread::spawn(move || block_on(executor.run(pending::<()>())));
+            }
+            Self { executor, threads, waits: TaskWaits::new() }
+        }
+
+        /// Waits, and returns the number of tasks that attended a meeting.
+        fn wait(&self, patience: u32) -> usize {
+            let attendants = Cell::new(0);
+            self.waits.wait(self.threads, patience, |meeting| {
+                attendants.set(attendants.get() + 1);
+                self.executor.spawn(meeting.attend()).detach();
+            });
+            attendants.get()
+        }
+
+        fn spawn(&self, task: impl Future<Output = ()> + Send + 'static) {
+            self.executor.spawn(task).detach();
+        }
+    }
+
+    /// Takes some time, which differs from number to number.
+    fn work(number: usize) {
+        #[allow(clippy::disallowed_methods, reason = "a task that computes for a while")]
+        thread::sleep(Duration::from_millis([3, 0, 1, 7, 0, 2][number % 6]));
+    }
+
+    #[test]
+    fn a_wait_ends_when_all_tasks_have_run() {
+        for threads in [1, 4] {
+            let pool = Pool::new(threads);
+            let done = Arc::new(Mutex::new(Vec::new()));
+            for frame in 0..8 {
+                for task in 0..frame {
+                    let done = done.clone();
+                    pool.spawn(async move {
+                        work(frame + task);
+                        lock(&done).push(task);
+                    });
+                }
+                // One that waits for something else, without end.
+                pool.spawn(pending());
+                assert_eq!(pool.wait(PATIENT_LOOKS), threads);
+                let mut done = std::mem::take(&mut *lock(&done));
+                if threads > 1 {
+                    done.sort_unstable();
+                }
+                assert_eq!(done, (0..frame).collect::<Vec<_>>(), "{threads} threads");
+            }
+        }
+    }
+
+    #[test]
+    fn a_wait_includes_tasks_that_wait_for_others_of_their_pool() {
+        for threads in [1, 4] {
+            let pool = Pool::new(threads);
+            let ended = Arc::new(AtomicU64::new(0));
+            for frame in 1..=5 {
+                let (executor, counted) = (pool.executor.clone(), ended.clone());
+                pool.spawn(async move {
+                    for child in 0..5 {
+                        yield_now().await;
+                        executor.spawn(async move { work(child) }).await;
+                    }
+                    counted.fetch_add(1, Ordering::Relaxed);
+                });
+                pool.wait(PATIENT_LOOKS);
+                assert_eq!(ended.load(Ordering::Relaxed), frame, "{threads} threads");
+            }
+        }
+    }
+
+    #[test]
+    fn worlds_that_wait_at_the_same_time_do_not_wait_for_each_other_without_end() {
+        for threads in [1, 3] {
+            let pool = Pool::new(threads);
+            thread::scope(|scope| {
+                for world in 0..4 {
+                    let pool = &pool;
+                    scope.spawn(move || {
+                        let ended = Arc::new(AtomicU64::new(0));
+                        for frame in 1..=20 {
+                            let counted = ended.clone();
+                            pool.spawn(async move {
+                                work(world + frame);
+                                counted.fetch_add(1, Ordering::Relaxed);
+                            });
+                            pool.wait(PATIENT_LOOKS);
+                            assert_eq!(ended.load(Ordering::Relaxed), frame as u64);
+                        }
+                    });
+                }
+            });
+        }
+    }
+
+    #[test]
+    fn a_task_that_does_not_end_is_left_behind_until_it_does() {
+        for threads in [1, 3] {
+            let pool = Pool::new(threads);
+            let (end, ended) = mpsc::channel::<()>();
+            pool.spawn(async move {
+                let _ = ended.recv();
+            });
+            assert_eq!(pool.wait(20), threads);
+            assert!(lock(&pool.waits.missed).is_some(), "it is noted");
+            if threads == 1 {
+                assert_eq!(pool.wait(PATIENT_LOOKS), 0, "the thread has not come yet");
+            }
+            drop(end);
+            while lock(&pool.waits.missed).is_some() {
+                pool.wait(PATIENT_LOOKS);
+                thread::yield_now();
+            }
+            let done = Arc::new(AtomicU64::new(0));
+            let counted = done.clone();
+            pool.spawn(async move {
+                work(3);
+                counted.fetch_add(1, Ordering::Relaxed);
+            });
+            assert_eq!(pool.wait(PATIENT_LOOKS), threads);
+            assert_eq!(done.load(Ordering::Relaxed), 1);
+        }
+    }
+
+    #[test]
+    fn only_worlds_with_the_mark_wait_for_tasks() {
+        let mut app = App::new();
+        app.add_plugins(tasks_in_order(TaskPoolOptions::default()));
+        let woken = Arc::new(Mutex::new((false, None::<Waker>)));
+        let seen = woken.clone();
+        let task = AsyncComputeTaskPool::get().spawn(poll_fn(move |context| {
+            let mut seen = lock(&seen);
+            if seen.0 {
+                return Poll::Ready(());
+            }
+            seen.1 = Some(context.waker().clone());
+            Poll::Pending
+        }));
+        wait_for_tasks(app.world());
+        let waker = {
+            let mut woken = lock(&woken);
+            woken.0 = true;
+            woken.1.take().expect("the task has run")
+        };
+        waker.wake();
+        wait_for_tasks(app.world());
+        assert!(!task.is_finished(), "this program runs tasks between frames");
+        app.insert_resource(TasksEndWithFrames);
+        wait_for_tasks(app.world());
+        assert!(task.is_finished());
+    }
+
+    #[test]
+    fn one_thread_runs_tasks_in_order_and_other_options_stay() {
+        let mut options = TaskPoolOptions::default();
+        options.io.max_threads = 7;
+        let options = tasks_in_order(options).task_pool_options;
+        assert_eq!((options.async_compute.min_threads, options.async_compute.max_threads), (1, 1));
+        assert_eq!(options.io.max_threads, 7);
     }
 }

@@ -54,7 +54,7 @@ fn walk(keys: Res<ButtonInput<KeyCode>>) {
 }
 ";
 
-/// A game with files, assets in a folder of its own, and keys that leave and skip levels.
+/// A game with files, tasks, assets in a folder of its own, and keys that leave and skip levels.
 const FILES: &str = "\
 #[derive(Component)]
 pub struct Player;
@@ -68,6 +68,7 @@ fn play(keys: Res<ButtonInput<KeyCode>>, assets: Res<AssetServer>) {
     for file in std::fs::read_dir(\"levels\") {}
 }
 pub fn defaults() -> AssetPlugin { AssetPlugin { file_path: \"art\".into(), ..default() } }
+fn search() -> Task<Vec2> { AsyncComputeTaskPool::get().spawn(async { Vec2::X }) }
 ";
 
 /// A game that spawns its player in a state, with two keys for each direction.
@@ -163,6 +164,7 @@ fn the_adapter_of_a_game_with_files_says_what_follows_from_them() {
         "keys that leave or skip levels: KeyN (src/lib.rs:3), Escape (src/lib.rs:6), Enter (src/lib.rs:7)",
         "folder of assets: art (src/lib.rs:12)",
         "reads of files: read_dir( (src/lib.rs:10)",
+        "tasks beside the frames: AsyncComputeTaskPool (src/lib.rs:13)",
         "to do: build the paths of files from env!(\"CARGO_MANIFEST_DIR\"), and sort the names of a folder",
     ] {
         assert!(found.lines().any(|found| found == line), "{line}: {found}");

@@ -90,7 +90,7 @@ use bevy::{app::PluginGroupBuilder, prelude::*};
 use bevy_playbot::{
     action::ActionSpace,
     agent::Agent,
-    engine::{Renewal, has_no_actions},
+    engine::{Renewal, has_no_actions, tasks_in_order},
     headless::HeadlessPlugins,
     legal::LegalActions,
     observation::{ObservationSpace, VectorSensor},
@@ -158,6 +158,7 @@ impl ForeignGame {
             limit: None,
             restart: Restart::Startup,
             forgotten: Vec::new(),
+            waits_for_tasks: false,
             ready: None,
             patience: PATIENCE,
             level: None,
@@ -361,7 +362,8 @@ impl ForeignGame {
     /// advance. The clock of the first tick is always two frames after the restart.
     ///
     /// Without a window, each frame also waits for the assets that the game has asked for. They arrive in the next
-    /// frame on every machine. Tasks of the game's own take any number of frames.
+    /// frame on every machine. Tasks of the game's own take any number of frames, unless the game
+    /// [waits for them](Self::wait_for_tasks).
     ///
     /// A level that needs the clock to get ready, such as one behind a splash screen, gets it in the second half of the
     /// frames of [`ready_within`](Self::ready_within).
@@ -372,6 +374,41 @@ impl ForeignGame {
     /// Sets the frames that a level may take to load. Default: 3600.
     pub fn ready_within(self, frames: u32) -> Self {
         self.with(|description| description.patience = frames)
+    }
+
+    /// Lets each frame end only when the tasks that were spawned in Bevy's `AsyncComputeTaskPool` have run. A task that
+    /// is spawned in a frame has its result in the next one, on every machine. No game time passes meanwhile. It is for
+    /// games that compute paths, levels or parts of a landscape beside their frames.
+    ///
+    /// Tasks run one after the other, in the order in which they are spawned. A task that waits for other tasks of this
+    /// pool is waited for, but not one that waits for a file, a timer or a thread. After ten seconds the game goes on
+    /// without a task, and a warning says so. A person who plays without a recording does not wait.
+    ///
+    /// ```
+    /// use bevy::{prelude::*, tasks::{AsyncComputeTaskPool, Task, block_on, poll_once}};
+    /// use playbot_harness::{foreign::ForeignGame, prelude::*};
+    ///
+    /// #[derive(Component)]
+    /// struct Search(Task<Vec2>);
+    ///
+    /// fn game(app: &mut App) {
+    ///     app.add_systems(Startup, |mut commands: Commands| {
+    ///         commands.spawn(Search(AsyncComputeTaskPool::get().spawn(async { Vec2::X })));
+    ///     })
+    ///     .add_systems(Update, |mut commands: Commands, mut searches: Query<(Entity, &mut Search)>| {
+    ///         for (entity, mut search) in &mut searches {
+    ///             if let Some(found) = block_on(poll_once(&mut search.0)) {
+    ///                 commands.entity(entity).remove::<Search>().insert(Transform::from_translation(found.extend(0.0)));
+    ///             }
+    ///         }
+    ///     });
+    /// }
+    ///
+    /// let game = ForeignGame::new("search", 1, game).keys([vec![], vec![KeyCode::Space]]).observe(["x"], || [0.0]);
+    /// assert_eq!(game.wait_for_tasks().problem(), None);
+    /// ```
+    pub fn wait_for_tasks(self) -> Self {
+        self.with(|description| description.waits_for_tasks = true)
     }
 
     /// Creates the level after the restart, with a system that runs once. It finds the level's number in
@@ -571,18 +608,17 @@ impl HostTools for ForeignGame {
     }
 
     fn headless_plugins(&self, plugins: HeadlessPlugins) -> PluginGroupBuilder {
+        let plugins = if self.description.waits_for_tasks { plugins.with_tasks_in_order() } else { plugins };
         let plugins = match &self.description.headless_plugins {
             Some(change) => change(plugins),
             None => plugins.build(),
         };
-        self.windowed_plugins(plugins)
+        self.description.changed_plugins(plugins)
     }
 
     fn windowed_plugins(&self, plugins: PluginGroupBuilder) -> PluginGroupBuilder {
-        match &self.description.default_plugins {
-            Some(change) => change(plugins),
-            None => plugins,
-        }
+        let plugins = if self.description.waits_for_tasks { plugins.set(tasks_in_order(default())) } else { plugins };
+        self.description.changed_plugins(plugins)
     }
 
     fn arenas_per_world(&self) -> Option<u32> {

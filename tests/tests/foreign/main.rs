@@ -14,6 +14,7 @@ mod play;
 #[cfg(unix)]
 mod prints;
 mod rebuild;
+mod resets;
 mod restarts;
 mod snapshots;
 mod starts;

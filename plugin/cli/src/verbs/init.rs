@@ -194,6 +194,7 @@ impl GameFolder {
             ("loads of assets", at(&facts.loads)),
             ("folder of assets", folder.unwrap_or(assets)),
             ("reads of files", at(&facts.files)),
+            ("tasks beside the frames", at(&facts.tasks)),
             ("random numbers with a seed", at(&facts.seeded)),
             ("random numbers without a seed", at(&facts.unseeded)),
             ("clocks of the machine", at(&facts.clocks)),
@@ -363,6 +364,12 @@ fn adapter(name: &str, library: &str, package: &str, facts: &GameFacts) -> Strin
         );
     } else if !facts.loads.is_empty() || !facts.loaders.is_empty() {
         text.push_str("        // TODO: if a level loads while the game runs, when it is ready: .ready(condition)\n");
+    }
+    if !facts.tasks.is_empty() {
+        text.push_str(
+            "        // Each frame waits for the tasks of the game, so that they take as many frames on every machine.\n        \
+             .wait_for_tasks()\n",
+        );
     }
     if let Some(at) = facts.files.first() {
         let place = at.place(facts.has_library);

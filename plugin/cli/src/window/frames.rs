@@ -22,7 +22,7 @@ use bevy_playbot::{
     demo::{file::DemoEpisode, recorder::Recorder},
     engine::{
         PressesForPeople, TickSchedules, deliver_assets, deliver_between_frames, run_on_one_thread, system_errors,
-        wait_for_assets,
+        wait_for_assets, wait_for_tasks,
     },
     episode::Episode,
     fault::Faults,
@@ -105,9 +105,10 @@ fn run_frame(world: &mut World, mut has_begun: Local<bool>) {
     } else {
         world.run_schedule(Main);
         if is_repeatable(world) {
+            wait_for_tasks(world);
             wait_for_assets(world);
         } else {
-            // A person sees the game's own loading screen, and may leave it.
+            // A person sees the game's own loading screen, and may leave it. Tasks take the time that they need.
             deliver_assets(world);
         }
         if let Some(failure) = system_errors::take() {
@@ -119,8 +120,8 @@ fn run_frame(world: &mut World, mut has_begun: Local<bool>) {
     devices::give_back(world);
 }
 
-/// Returns whether each asset has to arrive in the frame in which it arrives headless: for a recording, or because the
-/// agent is not played by a person.
+/// Returns whether each asset has to arrive, and each task to end, in the frame in which it does so headless: for a
+/// recording, or because the agent is not played by a person.
 fn is_repeatable(world: &World) -> bool {
     let agent = world.resource::<Deciders>().agent;
     world.contains_resource::<Recorder>() || world.get::<Control>(agent) != Some(&Control::Human)

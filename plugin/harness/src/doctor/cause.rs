@@ -87,7 +87,7 @@ impl CauseKind {
             }
             Self::ThreadState => {
                 "put it into the World, as a resource or a component; let a task's result arrive at a tick that does not \
-                 depend on when it was ready"
+                 depend on when it was ready, for which a foreign game has `.wait_for_tasks`"
             }
             Self::SharedByArenas => {
                 "put it on the arena or the agent as a component, or let the game have one arena per World"

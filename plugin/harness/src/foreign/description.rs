@@ -30,7 +30,7 @@ use bevy::{
 };
 use bevy_playbot::{
     action::ActionValue,
-    engine::{TickSchedules, check_actions, is_tick, panics::note_actions},
+    engine::{TasksEndWithFrames, TickSchedules, check_actions, is_tick, panics::note_actions},
     episode::EpisodeEnd,
     headless::{HeadlessPlugins, allow_whole_frames},
     observation::ObservationSpace,
@@ -86,6 +86,8 @@ pub(super) struct Description {
     pub(super) restart: Restart,
     /// Functions that drop all messages of one type each, with the type of its queue.
     pub(super) forgotten: Vec<(TypeId, Arc<dyn Fn(&mut World) + Send + Sync>)>,
+    /// Whether each frame ends when the game's tasks have run.
+    pub(super) waits_for_tasks: bool,
     pub(super) ready: Option<SystemFactory<bool>>,
     /// Frames that a level may take to load.
     pub(super) patience: u32,
@@ -106,6 +108,14 @@ pub(super) struct Description {
 }
 
 impl Description {
+    /// Returns Bevy's plugins with the game's own settings.
+    pub(super) fn changed_plugins(&self, plugins: PluginGroupBuilder) -> PluginGroupBuilder {
+        match &self.default_plugins {
+            Some(change) => change(plugins),
+            None => plugins,
+        }
+    }
+
     /// Returns the input of the agent at this place.
     pub(super) fn input_of(&self, place: usize) -> Input {
         self.agents.input_of(place % self.agents.count(), &self.input)
@@ -186,6 +196,9 @@ impl Plugin for ForeignPlugin {
     fn build(&self, app: &mut App) {
         let description = &self.game.description;
         app.insert_resource(PlayedMode(self.mode.clone()));
+        if description.waits_for_tasks {
+            app.insert_resource(TasksEndWithFrames);
+        }
         if let Some(first) = self.game.editor_level("", 0) {
             app.insert_resource(first.clone());
         }

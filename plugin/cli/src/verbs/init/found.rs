@@ -228,6 +228,8 @@ pub(super) struct GameFacts {
     pub asset_folder: Option<AssetFolder>,
     /// Lines that read other files.
     pub files: Vec<SourceLine>,
+    /// Lines with tasks that run beside the frames.
+    pub tasks: Vec<SourceLine>,
     /// The first line with a schedule of fixed steps.
     pub fixed: Option<SourceLine>,
     /// The fixed steps, if the game sets them.
@@ -308,6 +310,7 @@ impl GameFacts {
             self.loads.extend(source.lines_with(&[".load(", ".load_folder("]));
         }
         self.files.extend(source.lines_with(&FILES));
+        self.tasks.extend(source.lines_with(&["AsyncComputeTaskPool"]));
         self.fixed = self.fixed.take().or_else(|| source.lines_with(&FIXED).into_iter().next());
         if let (None, Some((offset, hz))) = (&self.step_rate, step_rate(code)) {
             self.step_rate = Some(StepRate { at: source.at("Time<Fixed>", offset), hz });

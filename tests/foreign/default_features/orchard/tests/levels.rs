@@ -1,6 +1,11 @@
-//! Tests of levels, as a game's own tests write them, and of what physics keeps from one episode to the next.
+//! Tests of levels, as a game's own tests write them, of what physics keeps from one episode to the next, and of tasks
+//! beside the frames.
 
-use bevy::{log::LogPlugin, prelude::*};
+use bevy::{
+    log::LogPlugin,
+    prelude::*,
+    tasks::{AsyncComputeTaskPool, Task, block_on, poll_once},
+};
 use foreign_orchard::{Body, FEET, Hero, Level, Map, Screen, game};
 use playbot::harness::{
     foreign::{ForeignGame, LevelSeed},
@@ -8,7 +13,11 @@ use playbot::harness::{
     worlds::build_world,
 };
 use playbot::prelude::*;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::{
+    sync::atomic::{AtomicU32, AtomicUsize, Ordering},
+    thread,
+    time::Duration,
+};
 
 /// Returns the game with the picker, as in `src/main.rs`, and with smaller observations.
 fn orchard() -> ForeignGame {
@@ -93,4 +102,74 @@ fn a_game_may_leave_out_the_log_and_set_up_its_own() {
 #[test]
 fn every_level_can_be_finished() {
     playbot::test(&orchard()).levels("default:0..7").assert_levels_solvable();
+}
+
+/// A hero who goes where a task says.
+#[derive(Component)]
+struct Walker;
+
+#[derive(Component)]
+struct Search(Task<f32>);
+
+/// Times that one search after the other takes, in milliseconds, whatever World it belongs to.
+const DELAYS: [u64; 7] = [30, 0, 7, 60, 0, 21, 2];
+
+/// Looks for the next place while no search runs.
+fn search(walker: Single<&Transform, With<Walker>>, searches: Query<&Search>, mut commands: Commands) {
+    static SEARCHES: AtomicUsize = AtomicUsize::new(0);
+
+    if searches.is_empty() {
+        let delay = DELAYS[SEARCHES.fetch_add(1, Ordering::Relaxed) % DELAYS.len()];
+        let from = walker.translation.x;
+        commands.spawn(Search(AsyncComputeTaskPool::get().spawn(async move {
+            thread::sleep(Duration::from_millis(delay));
+            from + 1.0
+        })));
+    }
+}
+
+/// Goes to the place that a search has found.
+fn walk(
+    mut walker: Single<&mut Transform, With<Walker>>,
+    mut searches: Query<(Entity, &mut Search)>,
+    mut commands: Commands,
+) {
+    for (entity, mut search) in &mut searches {
+        if let Some(place) = block_on(poll_once(&mut search.0)) {
+            walker.translation.x = place;
+            commands.entity(entity).despawn();
+        }
+    }
+}
+
+/// Returns the game of the walker, whose frames wait for its searches.
+fn walking() -> ForeignGame {
+    let game = |app: &mut App| {
+        app.add_systems(Startup, |mut commands: Commands| {
+            commands.spawn((Walker, Transform::default()));
+        })
+        .add_systems(Update, (walk, search).chain());
+    };
+    ForeignGame::new("walking", 1, game)
+        .keys([vec![], vec![KeyCode::Space]])
+        .observe(["x"], |walker: Single<&Transform, With<Walker>>| [walker.translation.x])
+        .time_limit(20)
+        .wait_for_tasks()
+}
+
+#[test]
+fn a_task_that_is_spawned_in_a_frame_is_done_in_the_next_however_long_it_takes() {
+    let game = walking();
+    let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
+    let idle = BlindBot::Constant(ActionValue::Discrete(0));
+    world.entity_mut(agents[0]).insert((Control::Bot, idle, LevelQueue::list([1, 2])));
+    let mut places = Vec::new();
+    for _ in 0..40 {
+        world.tick().expect("sound");
+        places.push(world.get::<Observation>(agents[0]).expect("an agent").vector[0]);
+    }
+    // The frame of the restart begins the first search.
+    let episode: Vec<f32> = (0..20).map(|tick| tick as f32).collect();
+    assert_eq!(places, [&episode[..], &episode].concat());
+    playbot::test(&game).levels("default:0").assert_deterministic();
 }
