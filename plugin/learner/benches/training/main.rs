@@ -24,4 +24,14 @@ criterion::criterion_group! {
     config = data::measured(10);
     targets = updates::skill_epoch, updates::vectors, updates::images
 }
-criterion::criterion_main!(kernels, steps, updates);
+
+/// As the programs do, so that a machine can be timed as one with narrower vectors.
+fn main() {
+    if let Ok(limit) = std::env::var("PLAYBOT_INSTRUCTIONS") {
+        limit.parse().map(playbot_learner::Instructions::set_limit).expect("a set of instructions");
+    }
+    kernels();
+    steps();
+    updates();
+    criterion::Criterion::default().configure_from_args().final_summary();
+}
