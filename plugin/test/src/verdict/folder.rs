@@ -10,17 +10,16 @@ use crate::{
     findings::{FINDINGS, RecordedCourse, clear_findings, first_finding},
     verdict::{
         LevelVerdict,
-        error::{JOURNAL, TestError, io_error, json_fault},
+        error::{JOURNAL, TestError, io_error},
         plan::{RECORD, TestRecord},
         results::{RESULTS, ResultWriter},
     },
 };
 use playbot_harness::sealed_file::{remove_temporaries, unsealed_line};
-use playbot_learner::{disk, disk::DiskFile, seal_json, unseal_json, write_atomically, write_atomically_with};
+use playbot_learner::{disk, disk::DiskFile, seal_json, write_atomically, write_atomically_with};
 use serde::Deserialize;
 use std::{
     collections::{BTreeMap, BTreeSet},
-    fs,
     fs::{OpenOptions, TryLockError},
     io,
     io::{BufRead, BufReader, Read, Seek, SeekFrom, Write},
@@ -145,17 +144,8 @@ fn remove(file: &Path) -> Result<(), TestError> {
     }
 }
 
-/// Reads the description of a test.
-pub(super) fn read_record(file: &Path) -> Result<TestRecord, TestError> {
-    let text = fs::read_to_string(file).map_err(io_error("read", file))?;
-    let next = "replace the results with --force, or choose another --out";
-    let damaged = |line, message| TestError::Damaged { path: file.into(), line, message, next };
-    let text = unseal_json(&text).map_err(|error| damaged(1, error.to_string()))?.text;
-    serde_json::from_str(&text).map_err(|error| damaged(error.line(), json_fault(&error)))
-}
-
 fn check_same(folder: &Path, file: &Path, record: &TestRecord) -> Result<(), TestError> {
-    let known = read_record(file)?;
+    let known = TestRecord::read(file)?;
     let mut differences = known.differences(record);
     if known.shard != record.shard {
         let words =

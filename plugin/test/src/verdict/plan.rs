@@ -3,7 +3,7 @@
 use crate::{
     detectors::Detectors,
     verdict::{
-        error::TestError,
+        error::{TestError, io_error, json_fault},
         maps::{MapScope, hash_of_files},
         played::{Played, Task},
         shard::Shard,
@@ -18,9 +18,10 @@ use playbot_harness::{
     split::LevelSplit,
     worlds::Arrangement,
 };
+use playbot_learner::unseal_json;
 use playbot_report::counted;
 use serde::{Deserialize, Serialize};
-use std::path::Path;
+use std::{fs, path::Path};
 
 /// Name of the file with the description of a test, in its folder.
 pub(super) const RECORD: &str = "test.json";
@@ -174,6 +175,15 @@ impl TestPlan {
 type Kept = (String, u64, &'static str);
 
 impl TestRecord {
+    /// Reads a file.
+    pub(super) fn read(file: &Path) -> Result<Self, TestError> {
+        let text = fs::read_to_string(file).map_err(io_error("read", file))?;
+        let next = "replace the results with --force, or choose another --out";
+        let damaged = |line, message| TestError::Damaged { path: file.into(), line, message, next };
+        let text = unseal_json(&text).map_err(|error| damaged(1, error.to_string()))?.text;
+        serde_json::from_str(&text).map_err(|error| damaged(error.line(), json_fault(&error)))
+    }
+
     /// Describes the differences between two tests, without their shards.
     pub fn differences(&self, other: &Self) -> Vec<String> {
         let mut found = self.differences_of_game(other);

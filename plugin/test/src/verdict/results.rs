@@ -11,7 +11,6 @@ use crate::{
     verdict::{
         LevelOutcome, LevelVerdict, Places, TooShort,
         error::{JOURNAL, MAKE_AGAIN, TestError, io_error, json_fault},
-        folder::read_record,
         plan::{RECORD, TestRecord},
         statistics::Trials,
     },
@@ -196,7 +195,7 @@ impl ResultLines {
 
 /// Returns the command that goes on with the test that was begun in a folder; `None` without one.
 fn unfinished(folder: &Path) -> Option<String> {
-    let record = read_record(&folder.join(RECORD)).ok().filter(|_| folder.join(JOURNAL).exists())?;
+    let record = TestRecord::read(&folder.join(RECORD)).ok().filter(|_| folder.join(JOURNAL).exists())?;
     Some(record.resumed_in(folder))
 }
 
