@@ -29,7 +29,6 @@ use playbot_harness::{
 };
 use playbot_learner::{Dataset, FileError, HasExitCode, SeenLevels, SkillModel, disk};
 use playbot_report::{statistics::steps_to_reach, to_svg};
-use serde::{Deserialize, Serialize};
 use std::{
     collections::BTreeSet,
     fs,
