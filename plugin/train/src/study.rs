@@ -3,8 +3,8 @@
 //! The folder, in reading order:
 //!
 //! - `conditions`: training and test conditions of a study's variants, as text.
-//! - `table`: studies as Markdown: means over the seeds, the numbers of every seed, and the command to run again; and
-//!   the experiment beside them.
+//! - `table`: studies as Markdown: means over the seeds, the numbers of every seed, and the command to run again; the
+//!   experiment beside them; and the cost of their runs.
 
 mod conditions;
 pub(crate) mod table;

@@ -1,14 +1,27 @@
-//! Studies as Markdown: means over the seeds, the numbers of every seed, and the command to run again; and the
-//! experiment beside them.
+//! Studies as Markdown: means over the seeds, the numbers of every seed, and the command to run again; the experiment
+//! beside them; and the cost of their runs.
 
-use crate::study::{StudyReport, StudyResult, TestResult, TrainingResult, conditions::count_of};
-use playbot_harness::brief::shell_word;
+use crate::{
+    run_dir::COST,
+    study::{StudyReport, StudyResult, StudyRun, TestResult, TrainingResult, conditions::count_of},
+};
+use playbot_harness::{
+    brief::shell_word,
+    sealed_file::{SealedFileError, read_sealed, write_sealed},
+};
 use playbot_report::{
+    counted,
     number::{UNKNOWN, fixed, mean_and_error},
     statistics::mean_and_sd,
     whole,
 };
-use std::{fmt::Write, path::Path};
+use serde::{Deserialize, Serialize};
+use std::{
+    fmt::Write,
+    fs,
+    path::Path,
+    time::{Duration, Instant},
+};
 
 /// The name of the experiment beside the table.
 pub const EXPERIMENT: &str = "experiment.ron";
@@ -211,6 +224,102 @@ pub fn markdown_table(headings: &[&str], rows: impl Iterator<Item = Vec<String>>
         }
     }
     table
+}
+
+// The cost of a study's runs.
+
+/// Time that was spent on a run, over all resumptions.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Cost {
+    /// Seconds of all processors together; `None` where the system does not report it.
+    cpu_s: Option<f64>,
+    /// Seconds by the clock.
+    wall_s: f64,
+}
+
+/// A clock that runs while a run is worked on.
+pub(crate) struct CostClock {
+    begun: Instant,
+    cpu: Option<Duration>,
+}
+
+impl CostClock {
+    pub(crate) fn start() -> Self {
+        Self { begun: Instant::now(), cpu: cpu_time() }
+    }
+
+    /// Adds the elapsed time to the cost of the run in `folder`.
+    ///
+    /// # Errors
+    ///
+    /// It cannot be written.
+    pub(crate) fn note(&self, folder: &Path) -> Result<(), SealedFileError> {
+        let spent = self.cpu.zip(cpu_time()).map(|(before, now)| now.saturating_sub(before).as_secs_f64());
+        let before = Cost::of(folder);
+        let cost = Cost {
+            cpu_s: match before {
+                Some(before) => before.cpu_s.zip(spent).map(|(before, spent)| before + spent),
+                None => spent,
+            },
+            wall_s: before.unwrap_or_default().wall_s + self.begun.elapsed().as_secs_f64(),
+        };
+        write_sealed(&folder.join(COST), &cost)
+    }
+}
+
+impl Cost {
+    /// Reads the cost of the run in `folder` so far; `None` if there is no note, or the note is damaged.
+    fn of(folder: &Path) -> Option<Self> {
+        let file = folder.join(COST);
+        if !file.exists() {
+            return None;
+        }
+        read_sealed(&file)
+            .inspect_err(|error| tracing::warn!("{error}; the earlier cost of the run is unknown"))
+            .map_or(None, |(cost, _)| Some(cost))
+    }
+}
+
+/// Formats a table of the cost of each variant, over its seeds, and the command.
+pub(crate) fn cost_table(runs: &[StudyRun], folder: &Path, command: &str, threads: usize) -> String {
+    let mut rows = Vec::new();
+    let mut total = (0.0, 0.0, true);
+    let mut variants: Vec<&str> = runs.iter().map(|run| run.variant.as_str()).collect();
+    variants.dedup();
+    for variant in variants {
+        let of_variant: Vec<&StudyRun> = runs.iter().filter(|run| run.variant == variant).collect();
+        let costs: Vec<Option<Cost>> = of_variant.iter().map(|run| Cost::of(&folder.join(run.id()))).collect();
+        let sum = |of: fn(&Cost) -> Option<f64>| -> Option<f64> {
+            costs.iter().map(|cost| cost.as_ref().and_then(of)).sum::<Option<f64>>()
+        };
+        let (cpu, wall) = (sum(|cost| cost.cpu_s), sum(|cost| Some(cost.wall_s)));
+        let trained = of_variant.iter().filter(|run| run.experiment.algorithm.is_trained());
+        let steps: u64 = trained.map(|run| run.experiment.whole_steps()).sum();
+        total = (total.0 + cpu.unwrap_or(0.0), total.1 + wall.unwrap_or(0.0), total.2 && cpu.is_some());
+        rows.push(vec![variant.to_owned(), of_variant.len().to_string(), steps.to_string(), hours(cpu), hours(wall)]);
+    }
+    let cpu = if total.2 { hours(Some(total.0)) } else { format!("at least {}", hours(Some(total.0))) };
+    format!(
+        "# What the study has cost\n\n```sh\n{command} --threads {threads}\n```\n\n{}\n{cpu} CPU hours in all, {} by the clock, with \
+         {}. A skill model is learned within the first run that needs it.\n",
+        markdown_table(&["variant", "runs", "environment steps", "CPU hours", "hours"], rows.into_iter()),
+        hours(Some(total.1)),
+        counted(threads as u64, "thread"),
+    )
+}
+
+fn hours(seconds: Option<f64>) -> String {
+    seconds.map_or("–".to_owned(), |seconds| format!("{:.3}", seconds / 3600.0))
+}
+
+/// Returns the time that all processors have spent on this process, where Linux reports it.
+fn cpu_time() -> Option<Duration> {
+    // The name in brackets may hold anything.
+    let stat = fs::read_to_string("/proc/self/stat").ok()?;
+    let mut fields = stat.rsplit_once(')')?.1.split_ascii_whitespace().skip(11);
+    let ticks: u64 = fields.next()?.parse::<u64>().ok()? + fields.next()?.parse::<u64>().ok()?;
+    // The kernel counts these in hundredths of a second for every program, whatever its own clock does.
+    Some(Duration::from_millis(ticks * 10))
 }
 
 #[cfg(test)]
@@ -416,6 +525,25 @@ mod tests {
             assert!(full.points.iter().zip(means).all(|(a, b)| near(a.0, b.0) && near(a.1, b.1)), "{:?}", full.points);
             let (low, high) = full.band.as_ref().expect("two seeds")[1];
             assert!(near(low, 0.6 * scale) && near(high, 0.8 * scale), "{low} to {high}");
+        }
+    }
+
+    #[test]
+    fn what_is_gone_on_with_costs_more() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let clock = CostClock::start();
+        let mut sum = 0u64;
+        while clock.begun.elapsed() < Duration::from_millis(60) {
+            sum = sum.wrapping_add(1);
+        }
+        assert!(sum > 0);
+        clock.note(folder.path()).expect("writable");
+        let once = Cost::of(folder.path()).expect("noted");
+        clock.note(folder.path()).expect("writable");
+        let twice = Cost::of(folder.path()).expect("noted");
+        assert!(once.wall_s >= 0.06 && twice.wall_s >= 2.0 * once.wall_s, "{once:?}, {twice:?}");
+        if cfg!(target_os = "linux") {
+            assert!(twice.cpu_s.expect("Linux says it") >= 2.0 * once.cpu_s.expect("Linux says it"));
         }
     }
 }
