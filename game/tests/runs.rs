@@ -5,7 +5,7 @@ mod program;
 
 use std::{fs, path::Path};
 
-use program::{ended, json_lines, unsealed};
+use program::{command, ended, json_lines, unsealed};
 
 /// Trains PPO for four updates of 128 steps, three runs: two seeds, and another learning rate.
 fn three_runs(folder: &Path) {
@@ -338,4 +338,25 @@ fn what_a_run_has_lost_and_what_is_left_of_another_is_said() {
     assert!(!path("b/run.json.tmp7").exists() && !path("b.replaced-7").exists());
     let (listed, _) = ended(folder, &["runs", "ls"], 0);
     assert!(!listed.contains("left over"), "{listed}");
+}
+
+/// Returns a file's FNV-1a hash.
+fn hash(path: &Path) -> u64 {
+    let bytes = fs::read(path).expect("written");
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3))
+}
+
+#[test]
+fn the_first_updates_of_the_quickstart_have_the_same_bytes_on_every_machine() {
+    for (threads, instructions) in [("1", "widest"), ("2", "avx2")] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let train = ["train", "--algorithm", "ppo", "--steps", "16384", "--threads", threads, "--run", "q"];
+        let mut program = command(folder.path(), &train);
+        program.env("PLAYBOT_INSTRUCTIONS", instructions);
+        playbot_shell::ended(program, 0);
+        let files = ["checkpoints/step-000000016384/learner.safetensors", "metrics.jsonl"];
+        let found = files.map(|file| hash(&folder.path().join("q").join(file)));
+        let wanted = [0x626c_0af2_6bb9_793e, 0xa82b_68d7_d9cb_7b37];
+        assert_eq!(found, wanted, "{found:#x?} on {threads} threads, {instructions}");
+    }
 }
