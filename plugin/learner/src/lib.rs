@@ -36,6 +36,7 @@
 //! # Ok::<(), playbot_learner::LearnError>(())
 //! ```
 
+#![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
 mod device;
 pub mod disk;
 mod error;

@@ -67,7 +67,7 @@ pub fn ppo(criterion: &mut Criterion) {
         logit_offsets: None,
         ppo: PpoBatch {
             actions: ActionBatch::new(&actions, &device),
-            old_log_probs: column() * 0.01 - (CHOICES as f32).ln(),
+            old_log_probs: column() * 0.01 - libm::logf(CHOICES as f32),
             advantages: column(),
             old_values: column(),
             returns: column(),

@@ -101,7 +101,7 @@ fn acted(rollout: Rollout, latent: usize, rng: &mut ChaCha8Rng) -> Rollout {
     Rollout {
         z: normals(rows * latent, rng),
         actions: Actions::Discrete(choices(rows, rng)),
-        log_probs: vec![-(CHOICES as f32).ln(); rows],
+        log_probs: vec![-libm::logf(CHOICES as f32); rows],
         values: vec![0.0; rows],
         ..rollout
     }

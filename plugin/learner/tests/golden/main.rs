@@ -5,6 +5,7 @@
 //! `PLAYBOT_GOLDEN` names; those of variants of SAC lie in `tests/fixtures/sac_variants`, beside the script that makes
 //! them.
 
+#![allow(clippy::disallowed_methods, reason = "tests compare with the system's functions")]
 mod adam;
 mod case;
 mod fixed;

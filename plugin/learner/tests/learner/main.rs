@@ -1,5 +1,6 @@
 //! Tests of the learner as a whole: learning, exactness, restarts.
 
+#![allow(clippy::disallowed_methods, reason = "tests compare with the system's functions")]
 mod augmentation;
 mod checkpoint;
 mod clock;
