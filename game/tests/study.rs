@@ -255,8 +255,9 @@ fn held_out_levels_of_a_known_layout_are_left_out_and_measured_apart_if_wanted()
         assert_eq!((row["test"]["layouts"].as_u64(), row["test"]["episodes"].as_u64()), (Some(3), Some(3)), "{row}");
     }
 
-    let metrics = folder.join("runs/plain-seed1/metrics.jsonl");
-    let before = fs::metadata(&metrics).and_then(|data| data.modified()).expect("there");
+    let checkpoint = folder.join("runs/plain-seed1/checkpoints/step-000000000128/learner.safetensors");
+    let written_at = || fs::metadata(&checkpoint).and_then(|data| data.modified()).expect("there");
+    let before = written_at();
     let with = ok(twins(&["--resume", "--include-seen"]));
     assert!(errors(&with).contains("measured apart of hard:142..145: 1 level"), "{}", errors(&with));
     let words = "All 4 levels of hard:142..145, with the 1 that some run knows.";
@@ -267,7 +268,7 @@ fn held_out_levels_of_a_known_layout_are_left_out_and_measured_apart_if_wanted()
         assert_eq!((&row["with_seen"]["layouts"], &row["with_seen"]["seen"]), (&4.into(), &1.into()), "{row}");
         assert_eq!(row["with_seen"]["level_returns"].as_array().map(Vec::len), Some(4), "{row}");
     }
-    assert_eq!(fs::metadata(&metrics).and_then(|data| data.modified()).expect("there"), before, "it was trained again");
+    assert_eq!(written_at(), before, "it was trained again");
     ok(twins(&["--resume"]));
     assert!(written(folder) == expected.0, "the table of all levels left something behind");
 

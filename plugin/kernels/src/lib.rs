@@ -16,6 +16,7 @@
 //! - [`kept_memory`]: memory that one pass hands to the next.
 
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
+
 pub mod among_workers;
 pub mod dense;
 pub mod elementwise;

@@ -37,6 +37,7 @@
 //! ```
 
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
+
 mod device;
 pub mod disk;
 mod error;

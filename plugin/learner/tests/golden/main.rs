@@ -6,6 +6,7 @@
 //! them.
 
 #![allow(clippy::disallowed_methods, reason = "tests compare with the system's functions")]
+
 mod adam;
 mod case;
 mod fixed;

@@ -1,6 +1,7 @@
 //! Tests of the learner as a whole: learning, exactness, restarts.
 
 #![allow(clippy::disallowed_methods, reason = "tests compare with the system's functions")]
+
 mod augmentation;
 mod checkpoint;
 mod clock;
