@@ -9,14 +9,12 @@
 //!
 //! The folder, in reading order:
 //!
-//! - `grid`: the layout of one image's pixels in memory.
+//! - `grid`: the layout of one image's pixels in memory, and max-pooling.
 //! - `layer`: one convolution of one image, and the plan of all stages.
-//! - `pool`: max-pooling.
 //! - `winograd` and `products`: 3×3 convolutions with fewer products.
 
 pub mod grid;
 mod layer;
-mod pool;
 mod products;
 #[cfg(test)]
 mod tests;
@@ -269,7 +267,7 @@ fn forward(
                 let (x, y) = layout.two(input, output, values);
                 let (buffer, grid, to) = (&mut wides[wide][..], plan.wides[wide], plan.slots[output]);
                 plan.layers[layer].forward(x, &weights[layer], points, Write(buffer));
-                pool::forward(buffer, grid, y, to, &mut marks[from..][..to.numbers()]);
+                grid::pool(buffer, grid, y, to, &mut marks[from..][..to.numbers()]);
             }
             Step::Residual { layers: [layer0, layer1], x, relu: slot, inner } => {
                 let (from, to) = layout.two(x, slot, values);
@@ -383,7 +381,7 @@ fn backward(
             Step::Pool { layer, input, output, wide, marks: from } => {
                 let (to, grad) = lean.two(input, output, grads);
                 let (buffer, grid, of) = (&mut wides[wide][..], plan.wides[wide], plan.slots[output]);
-                pool::backward(grad, of, &marks[from..][..of.numbers()], buffer, grid);
+                grid::pool_backward(grad, of, &marks[from..][..of.numbers()], buffer, grid);
                 layers[layer].add_gradients(kept.read(input, values), buffer, points, sums[layer]);
                 if number > 0 {
                     layers[layer].backward(buffer, &weights[layer], points, to);

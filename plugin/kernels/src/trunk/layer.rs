@@ -5,8 +5,7 @@ use crate::{
     elementwise::{Add, Store, Write},
     tile::{LANES, Lanes, Window, column_sums, correlate, outer},
     trunk::{
-        grid::{ConvShape, Grid, window_places},
-        pool::pooled,
+        grid::{ConvShape, Grid, pooled, window_places},
         winograd,
         winograd::PointBuffers,
     },

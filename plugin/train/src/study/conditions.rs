@@ -2,11 +2,14 @@
 
 use crate::{
     Experiment, LearnerKind,
-    study::{StudyReport, study_runs, table::rate_cell},
+    study::{
+        StudyReport, study_runs,
+        table::{count_of, rate_cell},
+    },
 };
 use playbot_harness::split::LevelSplit;
 use playbot_learner::brief_number;
-use playbot_report::number::{fixed, times, whole};
+use playbot_report::number::{fixed, times};
 
 impl StudyReport {
     /// Returns the conditions of the study as a paragraph of Markdown.
@@ -91,11 +94,6 @@ impl StudyReport {
         let all = self.variants().into_iter().map(|variant| (variant, experiment(variant)));
         all.filter(|(_, run)| run.algorithm.is_trained()).collect()
     }
-}
-
-/// Counts things with groups of digits, as tables have them.
-pub(super) fn count_of(count: u64, what: &str) -> String {
-    if count == 1 { format!("1 {what}") } else { format!("{} {what}s", whole(count as f64)) }
 }
 
 /// Describes levels, steps and, for learners with a free number of them, gradient steps.

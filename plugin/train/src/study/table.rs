@@ -3,7 +3,7 @@
 
 use crate::{
     run_dir::COST,
-    study::{StudyReport, StudyResult, StudyRun, TestResult, TrainingResult, conditions::count_of},
+    study::{StudyReport, StudyResult, StudyRun, TestResult, TrainingResult},
 };
 use playbot_harness::{
     brief::shell_word,
@@ -188,6 +188,11 @@ fn steps_cell(runs: &[&StudyResult]) -> String {
 fn mean_cell(values: &[f64], decimals: usize) -> String {
     let (mean, sd) = mean_and_sd(values);
     mean_and_error(mean, if values.len() > 1 { sd } else { f64::NAN }, decimals)
+}
+
+/// Counts things with groups of digits.
+pub(super) fn count_of(count: u64, what: &str) -> String {
+    if count == 1 { format!("1 {what}") } else { format!("{} {what}s", whole(count as f64)) }
 }
 
 /// Formats a success rate as in the cells below it, `70.0 ± 14.1%`: a blank before the sign would widen every column.
