@@ -94,7 +94,7 @@ fn shake(seed: u64, steps: u64) -> Result<Extremes, String> {
 /// Returns the distance from the outside of a wall to a position, in metres, seen from above; 0 within.
 fn distance(wall: &WallBox, place: [f32; 2]) -> f32 {
     let beyond = [0, 1].map(|axis| ((place[axis] - wall.centre[axis]).abs() - wall.half[axis]).max(0.0));
-    beyond[0].hypot(beyond[1])
+    (beyond[0] * beyond[0] + beyond[1] * beyond[1]).sqrt()
 }
 
 /// Returns four walls of AntMaze's height, so near that legs and walls meet often.

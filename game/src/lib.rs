@@ -8,6 +8,8 @@
 //! - [`senses`]: the mazes with more observations: rays and goal, a map, or positional encoding.
 //! - [`GAMES`]: all of them, for the program `playbot`.
 
+#![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
+
 pub mod ant;
 pub mod antmaze;
 pub mod coinrun;

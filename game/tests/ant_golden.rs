@@ -1,5 +1,7 @@
 //! Tests of the ant against MuJoCo 3.1.6 with D4RL's model: `fixtures/ant_reference.json` has the measurements.
 
+#![allow(clippy::disallowed_methods, reason = "tests compare with the system's functions")]
+
 #[path = "shared/golden.rs"]
 mod golden;
 

@@ -1,5 +1,7 @@
 //! Tests of the generator, the rules and whole episodes against numbers measured on Procgen.
 
+#![allow(clippy::disallowed_methods, reason = "tests compare with the system's functions")]
+
 #[path = "shared/golden.rs"]
 mod golden;
 

@@ -13,6 +13,8 @@
 //! - [`explore`]: exploration of a level without training.
 //! - [`verdict_report`]: results as one HTML page, with pictures of the worst levels.
 
+#![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
+
 pub mod assertions;
 pub mod detectors;
 pub mod explore;

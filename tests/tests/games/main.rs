@@ -1,5 +1,7 @@
 //! Tests of CoinRun, the mazes and the ants as games of Bevy.
 
+#![allow(clippy::disallowed_methods, reason = "tests compare with the system's functions")]
+
 mod antmaze;
 mod coinrun;
 mod coinrun_picture;
