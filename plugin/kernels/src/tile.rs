@@ -81,14 +81,8 @@ pub(crate) fn is_wide<S: Simd>() -> bool {
 /// Returns the channels that begin at a position.
 #[inline(always)]
 pub(crate) fn lanes_at(x: &[f32], at: usize) -> &Lanes {
-    numbers_at(x, at)
-}
-
-/// Returns the numbers that begin at a position, with one check for all of them.
-#[inline(always)]
-pub(crate) fn numbers_at<const N: usize>(x: &[f32], at: usize) -> &[f32; N] {
-    let Some(numbers) = x[at..].first_chunk() else { unreachable!("images have slack behind their last pixel") };
-    numbers
+    let Some(lanes) = x[at..].first_chunk::<LANES>() else { unreachable!("images have slack behind their last pixel") };
+    lanes
 }
 
 /// Computes the sums of all windows for a block, tile by tile.
@@ -105,11 +99,7 @@ fn strip<S: Simd, const P: usize, G: FnMut(usize, usize, &Lanes)>(
     for (tile, starts) in starts.chunks(P).enumerate() {
         let mut at = [starts[0]; P];
         at[..starts.len()].copy_from_slice(starts);
-        let sums = if is_wide::<S>() {
-            tile_sums::<S, P>(x, at, window, weights, first)
-        } else {
-            narrow_sums::<S, P>(x, at, window, weights, first)
-        };
+        let sums = tile_sums::<S, P>(x, at, window, weights, first);
         for (p, sums) in sums.iter().enumerate() {
             if p < starts.len() {
                 store(tile * P + p, block, sums);
@@ -194,57 +184,6 @@ fn tile_sums<S: Simd, const P: usize>(
         }
     }
     sums
-}
-
-/// Numbers of each window that [`narrow_sums`] takes at once.
-const DEPTH: usize = 8;
-
-/// Does [`tile_sums`] where a vector has half of the lanes. There a check in the innermost loop would store the sums in each
-/// round, and so there is one check of each window for several rounds. With all lanes it would be the other way round.
-#[inline(always)]
-fn narrow_sums<S: Simd, const P: usize>(
-    x: &[f32],
-    at: [usize; P],
-    window: Window,
-    weights: &[Lanes],
-    first: Lanes,
-) -> [Lanes; P] {
-    let mut sums = [first; P];
-    for (piece, weights) in weights.chunks_exact(window.len).enumerate() {
-        let start = at.map(|at| at + piece * window.step);
-        let (deep, rest) = weights.as_chunks::<DEPTH>();
-        for (step, weights) in deep.iter().enumerate() {
-            add_to_tile::<S, P, DEPTH>(&mut sums, x, start.map(|start| start + step * DEPTH), weights);
-        }
-        for (k, weights) in rest.iter().enumerate() {
-            let from = deep.len() * DEPTH + k;
-            add_to_tile::<S, P, 1>(&mut sums, x, start.map(|start| start + from), std::array::from_ref(weights));
-        }
-    }
-    sums
-}
-
-/// Adds `D` numbers, from each of these positions on, times their weights.
-#[inline(always)]
-#[allow(clippy::needless_range_loop, reason = "with iterators the sums do not stay in registers")]
-fn add_to_tile<S: Simd, const P: usize, const D: usize>(
-    sums: &mut [Lanes; P],
-    x: &[f32],
-    from: [usize; P],
-    weights: &[Lanes; D],
-) {
-    let mut seen = [&[0.0; D]; P];
-    for p in 0..P {
-        seen[p] = numbers_at(x, from[p]);
-    }
-    for k in 0..D {
-        for p in 0..P {
-            let x = seen[p][k];
-            for j in 0..LANES {
-                sums[p][j] = fused::<S>(x, weights[k][j], sums[p][j]);
-            }
-        }
-    }
 }
 
 #[inline(always)]
@@ -351,9 +290,9 @@ impl Pairs<'_> {
             }
         }
         for (&start, &place) in self.starts.iter().zip(self.places) {
-            let (seen, y) = (numbers_at::<P>(self.x, start + first), *lanes_at(y, place));
+            let (at, y) = (start + first, *lanes_at(y, place));
             for p in 0..P {
-                let x = seen[p];
+                let x = self.x[at + p];
                 for l in 0..LANES {
                     tile[p][l] = fused::<S>(x, y[l], tile[p][l]);
                 }
@@ -376,10 +315,9 @@ impl Pairs<'_> {
             }
         }
         for (&start, &place) in self.starts.iter().zip(self.places) {
-            let seen = numbers_at::<P>(self.x, start + first);
-            let (y0, y1) = (*lanes_at(y, place), *lanes_at(y, place + LANES));
+            let (at, y0, y1) = (start + first, *lanes_at(y, place), *lanes_at(y, place + LANES));
             for p in 0..P {
-                let x = seen[p];
+                let x = self.x[at + p];
                 for l in 0..LANES {
                     tile0[p][l] = fused::<S>(x, y0[l], tile0[p][l]);
                 }

@@ -5,7 +5,7 @@
 
 use crate::{
     instructions::macerator::{self, Simd},
-    tile::{LANES, Lanes, fused, is_wide, lanes_at, numbers_at},
+    tile::{LANES, Lanes, fused, is_wide, lanes_at},
 };
 
 /// Number of rows at a time where a vector has all lanes: with two blocks of channels the sums take 16 of 32
@@ -164,9 +164,9 @@ fn add_to_block<S: Simd, const P: usize>(v: &[f32], grad: &[f32], outputs: usize
         tile_sums.copy_from_slice(sums);
         let mut at = tile * P;
         for row in 0..v.len() / inputs {
-            let (seen, grad) = (numbers_at::<P>(v, at), *lanes_at(grad, row * outputs));
+            let grad = *lanes_at(grad, row * outputs);
             for p in 0..P {
-                let x = seen[p];
+                let x = v[at + p];
                 for l in 0..LANES {
                     tile_sums[p][l] = fused::<S>(x, grad[l], tile_sums[p][l]);
                 }
@@ -194,10 +194,9 @@ fn add_to_pair<S: Simd, const P: usize>(
         }
         let mut at = tile * P;
         for row in 0..v.len() / inputs {
-            let seen = numbers_at::<P>(v, at);
             let (grad0, grad1) = (*lanes_at(grad, row * outputs), *lanes_at(grad, row * outputs + LANES));
             for p in 0..P {
-                let x = seen[p];
+                let x = v[at + p];
                 for l in 0..LANES {
                     sums0[p][l] = fused::<S>(x, grad0[l], sums0[p][l]);
                 }
