@@ -21,7 +21,7 @@ use playbot_harness::{
     level_files::{LevelFileError, is_level_files},
     split::{LevelSplit, SplitError},
 };
-use playbot_learner::{Instructions, UnknownDevice};
+use playbot_learner::{UnknownDevice, limit_by_environment};
 use std::{
     error::Error,
     ffi::OsString,
@@ -45,9 +45,6 @@ pub(crate) struct Cli {
 
 /// The most columns of help on a terminal: longer lines are hard to read.
 const WIDEST: usize = 100;
-
-/// The variable that limits vector instructions.
-const INSTRUCTIONS: &str = "PLAYBOT_INSTRUCTIONS";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -259,15 +256,8 @@ fn with_width(command: Command, is_on_terminal: bool) -> Command {
     if is_on_terminal { command.max_term_width(WIDEST) } else { command.term_width(0) }
 }
 
-/// Sets the vector instructions that are asked for.
-fn limit_instructions() -> Result<(), CliError> {
-    let Some(name) = std::env::var_os(INSTRUCTIONS).filter(|name| !name.is_empty()) else { return Ok(()) };
-    let limit = name.to_string_lossy().parse::<Instructions>();
-    limit.map(Instructions::set_limit).map_err(|error| CliError::Usage(format!("{INSTRUCTIONS}: {error}")))
-}
-
 fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
-    limit_instructions()?;
+    limit_by_environment().map_err(CliError::Usage)?;
     match verb {
         Verb::Init(args) => init::run(&args),
         Verb::Quickstart(args) => quickstart::run(args, games),

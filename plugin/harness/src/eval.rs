@@ -20,7 +20,7 @@ use bevy_playbot::{
     unknown_name::UnknownName,
     vision::{ObservationConfig, VisionError},
 };
-use playbot_learner::{HasExitCode, Policy, PolicyFile};
+use playbot_learner::{HasExitCode, Policy, PolicyFile, settings::is_off};
 use serde::Serialize;
 use std::{
     collections::{BTreeMap, BTreeSet, HashMap},
@@ -394,10 +394,10 @@ pub struct EvalSummary {
     /// Levels that were played.
     pub levels: u64,
     /// Levels of the range that were left out, since the compared players know them.
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(skip_serializing_if = "is_off")]
     pub left_out: u64,
     /// Levels that were played although the compared players know them. [`summarize`] sets 0.
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(skip_serializing_if = "is_off")]
     pub seen: u64,
     /// Different layouts of the levels that were played; `None` if unknown: see
     /// [`HeldOut::different`](crate::held_out::HeldOut::different). [`summarize`] sets `None`.
@@ -421,10 +421,6 @@ pub struct EvalSummary {
     /// table's JSON.
     #[serde(skip)]
     pub level_returns: Vec<f64>,
-}
-
-fn is_zero(count: &u64) -> bool {
-    *count == 0
 }
 
 /// Summarises the episodes of one player on one split, all of whose other levels were left out.

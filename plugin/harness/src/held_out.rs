@@ -74,6 +74,17 @@ pub fn is_only_level(game: &dyn Game, mode: &str) -> bool {
     last_level(game, mode) == Some(0)
 }
 
+/// Levels that players are measured on, and those of them that the players know.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct KnownLevels {
+    /// Known levels that are left out.
+    pub left_out: BTreeSet<u64>,
+    /// The number of known levels that are measured with the others.
+    pub seen: u64,
+    /// Different layouts of the measured levels, as [`HeldOut::different`] counts them.
+    pub layouts: Option<u64>,
+}
+
 /// Held-out levels, kept unseen before the test, also under another mode's rules.
 pub struct HeldOut<'a> {
     game: &'a dyn Game,
@@ -167,6 +178,12 @@ impl<'a> HeldOut<'a> {
         let is_whole = hashed > 0 && hashed as u64 == self.split.len();
         let is_played = |levels: &&Vec<u64>| levels.iter().any(|level| !left_out.contains(level));
         is_whole.then(|| layouts.values().filter(is_played).count() as u64)
+    }
+
+    /// Leaves out the levels that players know, or keeps them all.
+    pub fn without(&self, known: BTreeSet<u64>, keeps_all: bool) -> KnownLevels {
+        let (left_out, seen) = if keeps_all { (BTreeSet::new(), known.len() as u64) } else { (known, 0) };
+        KnownLevels { layouts: self.different(&left_out), left_out, seen }
     }
 
     /// Returns the held-out levels that are seen: by number, as a file, or by their layout.

@@ -83,16 +83,12 @@ impl Function {
     /// Converts the gradient by the results to that by the elements; `kept` are the results of tanh and exp, and the
     /// elements of logarithms.
     fn backward(self, grad: &mut [f32], kept: &[f32]) {
-        if let Self::Tanh = self {
-            return elementwise::tanh_backward(grad, kept);
-        }
-        for (grad, kept) in grad.iter_mut().zip(kept) {
-            match self {
-                Self::Tanh => {}
-                Self::Exp => *grad *= kept,
-                Self::Ln => *grad /= kept,
-                Self::Ln1p => *grad /= 1.0 + kept,
-            }
+        let pairs = grad.iter_mut().zip(kept);
+        match self {
+            Self::Tanh => elementwise::tanh_backward(grad, kept),
+            Self::Exp => pairs.for_each(|(grad, y)| *grad *= y),
+            Self::Ln => pairs.for_each(|(grad, x)| *grad /= x),
+            Self::Ln1p => pairs.for_each(|(grad, x)| *grad /= 1.0 + x),
         }
     }
 }

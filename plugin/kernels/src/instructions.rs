@@ -7,7 +7,7 @@
 //! The limit is there to try that out, and to measure what another processor would get.
 
 use std::{
-    fmt,
+    env, fmt,
     str::FromStr,
     sync::atomic::{AtomicU8, Ordering},
 };
@@ -26,7 +26,7 @@ pub enum Instructions {
 }
 
 impl Instructions {
-    /// Every set.
+    /// Every set, in order.
     pub const ALL: [Self; 3] = [Self::Portable, Self::Avx2, Self::Widest];
 
     /// Returns the name.
@@ -39,9 +39,9 @@ impl Instructions {
     }
 
     /// Returns the limit that is set.
+    #[inline]
     pub fn limit() -> Self {
-        let limit = LIMIT.load(Ordering::Relaxed);
-        Self::ALL.into_iter().find(|set| *set as u8 == limit).unwrap_or(Self::Widest)
+        Self::ALL[usize::from(LIMIT.load(Ordering::Relaxed))]
     }
 
     /// Makes loops that begin from now on use at most these, on all threads. A machine that lacks them uses fewer.
@@ -50,6 +50,21 @@ impl Instructions {
     }
 }
 
+/// The variable of the environment that names the limit.
+const VARIABLE: &str = "PLAYBOT_INSTRUCTIONS";
+
+/// Sets the limit that the environment's `PLAYBOT_INSTRUCTIONS` names, if it is there and not empty.
+///
+/// # Errors
+///
+/// It names no set.
+pub fn limit_by_environment() -> Result<(), String> {
+    let Some(name) = env::var_os(VARIABLE).filter(|name| !name.is_empty()) else { return Ok(()) };
+    let limit: Result<Instructions, String> = name.to_string_lossy().parse();
+    limit.map(Instructions::set_limit).map_err(|error| format!("{VARIABLE}: {error}"))
+}
+
+/// The place of the limit in [`Instructions::ALL`].
 static LIMIT: AtomicU8 = AtomicU8::new(Instructions::Widest as u8);
 
 impl fmt::Display for Instructions {

@@ -86,7 +86,7 @@ pub use crate::{
 };
 pub use playbot_kernels::{
     among_workers::{among_awake_workers, among_workers, waited},
-    instructions::Instructions,
+    instructions::{Instructions, limit_by_environment},
 };
 
 /// Compiles and runs the examples of the README.

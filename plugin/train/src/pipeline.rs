@@ -52,15 +52,12 @@ use playbot_harness::{
     eval,
     eval::{EvalError, EvalPlan, EvalSummary, Player, summarize},
     game::Game,
-    held_out::HeldOut,
+    held_out::{HeldOut, KnownLevels},
     mode::ModeError,
     split::LevelSplit,
 };
 use playbot_learner::{FileError, PolicyFile, SeenLevels, SkillModel};
-use std::{
-    collections::BTreeSet,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// Failure of a step.
@@ -263,10 +260,10 @@ pub fn evaluate(
     let held_out = HeldOut::new(game, &experiment.test);
     let known = seen.map(|seen| held_out.seen_in(seen, &|_, _| {})).unwrap_or_default();
     let keeps_all = experiment.eval.include_seen || known.len() as u64 == experiment.test.len();
-    let (left_out, seen) = if keeps_all { (BTreeSet::new(), known.len() as u64) } else { (known, 0) };
+    let KnownLevels { left_out, seen, layouts } = held_out.without(known, keeps_all);
     let plan = EvalPlan { left_out, ..experiment.eval_plan(&experiment.test, threads) };
     let summary = summarize(name, &plan.split, &eval::evaluate(game, player, &plan, |_| {})?);
-    Ok(EvalSummary { seen, layouts: held_out.different(&plan.left_out), ..summary })
+    Ok(EvalSummary { seen, layouts, ..summary })
 }
 
 /// Returns the policy learned so far, as the file that a game ships with.

@@ -16,7 +16,7 @@ use crate::{
     study::table::markdown_table,
 };
 use playbot_harness::eval::EvalSummary;
-use playbot_learner::HasExitCode;
+use playbot_learner::{HasExitCode, settings::is_off};
 use playbot_report::{
     chart::{Chart, Curve},
     number::{UNKNOWN, fixed, mean_and_error},
@@ -229,7 +229,7 @@ pub struct TestResult {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub layouts: Option<u64>,
     /// Levels that some run of the study knows.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_off")]
     pub seen: u64,
     /// Episodes.
     pub episodes: u64,
@@ -246,10 +246,6 @@ pub struct TestResult {
     /// Mean return on each level, in ascending order of levels; empty in results of older versions.
     #[serde(default)]
     pub level_returns: Vec<f64>,
-}
-
-fn is_zero(count: &u64) -> bool {
-    *count == 0
 }
 
 impl From<&EvalSummary> for TestResult {

@@ -28,7 +28,7 @@ use tracing_subscriber::{
 };
 
 /// Filters messages that need no warning: a window manager without settings, a renderer in software or none at all, and
-/// a log that is there already. A failed graphics card is reported by the error that follows; which card computes is told.
+/// a log that is there already. A failed graphics card is reported by the error that follows. The card that computes is named.
 const QUIET: &str = "warn,winit=error,bevy_render=error,bevy_render::extract_resource=off,bevy_gltf=error,bevy_log=off,\
                      cubecl_runtime=error,playbot_learner::device=info";
 

@@ -17,7 +17,7 @@ use playbot_harness::{
     eval::{AtLeast, EvalPlan, Player},
     game::Game,
     games::{Artifact, Games},
-    held_out::HeldOut,
+    held_out::{HeldOut, KnownLevels},
     mode::ModeError,
     split::LevelSplit,
 };
@@ -147,7 +147,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
                 }
                 None => player::measure(game, name, player, &plan)?,
             };
-            (measured.summary.seen, measured.summary.layouts) = (known.measured, known.layouts);
+            (measured.summary.seen, measured.summary.layouts) = (known.seen, known.layouts);
             if args.json {
                 player::print_json(&measured.summary)?;
             }
@@ -165,16 +165,6 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     }
     shortfalls.iter().for_each(|shortfall| report!("{shortfall}"));
     Ok(if shortfalls.is_empty() { Outcome::Pass } else { Outcome::Findings })
-}
-
-/// The levels of a range that some player knows.
-struct KnownLevels {
-    /// Those that are not measured.
-    left_out: BTreeSet<u64>,
-    /// The number of those that are measured.
-    measured: u64,
-    /// Different layouts of the measured levels, if the game hashes them.
-    layouts: Option<u64>,
 }
 
 /// Decides whether known levels are measured: not if they are held out, and with --new-layouts in no range. All players
@@ -206,11 +196,7 @@ fn known_levels(
             report!("{levels} left out");
         }
     }
-    let of_range = |(split, known): (_, BTreeSet<u64>)| {
-        let (left_out, measured) = if keeps_all { (BTreeSet::new(), known.len() as u64) } else { (known, 0) };
-        let layouts = HeldOut::levels_of(game, split).different(&left_out);
-        KnownLevels { left_out, measured, layouts }
-    };
+    let of_range = |(split, known)| HeldOut::levels_of(game, split).without(known, keeps_all);
     Ok(splits.iter().zip(known).map(of_range).collect())
 }
 

@@ -21,7 +21,7 @@ use playbot_harness::{
     eval::{EvalPlan, Player},
     game::Game,
     games::Games,
-    held_out::{HeldOut, seen_by_training},
+    held_out::{HeldOut, KnownLevels, seen_by_training},
     sealed_file::write_atomically,
 };
 use playbot_learner::{Dataset, DeviceKind, SeenLevels, SkillModel, disk};
@@ -41,7 +41,6 @@ use playbot_train::{
 };
 use serde_json::json;
 use std::{
-    collections::BTreeSet,
     path::{Path, PathBuf},
     time::Instant,
 };
@@ -145,15 +144,12 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     players.push(("bc".to_owned(), behaviour_cloning(&skills, &experiment, draw)));
     players.extend(game.tools().bots.blind_bots().into_iter().map(|(name, bot)| (name.to_owned(), Player::Blind(bot))));
     let known = known_levels(game, &experiment, &skills);
-    let keeps_all = experiment.eval.include_seen || known.len() as u64 == experiment.test.len();
-    let (left_out, seen) = if keeps_all { (BTreeSet::new(), known.len() as u64) } else { (known, 0) };
-    let layouts = HeldOut::levels_of(game, &experiment.test).different(&left_out);
     let mut rows = Vec::new();
     for (name, player) in &players {
         let all = experiment.eval_plan(&experiment.test, args.threads.count());
-        let plan = EvalPlan { left_out: left_out.clone(), ..all };
+        let plan = EvalPlan { left_out: known.left_out.clone(), ..all };
         let mut measured = player::measure(game, name, player, &plan)?;
-        (measured.summary.seen, measured.summary.layouts) = (seen, layouts);
+        (measured.summary.seen, measured.summary.layouts) = (known.seen, known.layouts);
         if args.json {
             let mut line = json!(measured.summary);
             if let Some(one) = first.iter().find(|one| one.algorithm.name() == name) {
@@ -178,22 +174,23 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     Ok(Outcome::Pass)
 }
 
-/// Returns the held-out levels of a layout that the trainings or the recordings show, and reports how many they are.
-fn known_levels(game: &dyn Game, experiment: &Experiment, skills: &SkillModel) -> BTreeSet<u64> {
+/// Finds the held-out levels of a layout that the trainings or the recordings show, and reports how many they are.
+fn known_levels(game: &dyn Game, experiment: &Experiment, skills: &SkillModel) -> KnownLevels {
     let mut seen = seen_by_training(game, &experiment.train);
     seen.extend(skills.demos().unwrap_or(&SeenLevels::default()));
     let held_out = HeldOut::new(game, &experiment.test);
     let known = progress::comparing(|progress| held_out.seen_in(&seen, progress));
     let (test, levels) = (&experiment.test, counted(known.len() as u64, "level"));
     let of_layout = "of a layout that was recorded or trained on under another number";
-    match known.len() as u64 {
+    // Without a new level the known ones are better than none.
+    let is_all = known.len() as u64 == test.len();
+    match known.len() {
         0 => {}
-        // Without a new level the known ones are better than none.
-        all if all == test.len() => report!("warning: each of the held-out levels {test} is {of_layout}"),
+        _ if is_all => report!("warning: each of the held-out levels {test} is {of_layout}"),
         _ if experiment.eval.include_seen => report!("measured with the others of {test}: {levels} {of_layout}"),
         _ => report!("left out of {test}: {levels} {of_layout}"),
     }
-    known
+    held_out.without(known, experiment.eval.include_seen || is_all)
 }
 
 /// A training in the report.

@@ -328,27 +328,18 @@ fn check_results(runs: &[StudyRun], args: &Args) -> Result<(), CliError> {
 fn command(args: &Args) -> String {
     let game = args.from.game.iter().map(|game| quoted(game));
     let mut words: Vec<String> = [format!("{} study", program::name())].into_iter().chain(game).collect();
-    let mut push = |name: &str, value: String| words.push(format!("--{name} {}", quoted(&value)));
-    if let Some(path) = &args.from.experiment {
-        push("experiment", path.display().to_string());
-    }
-    for set in &args.from.set {
-        push("set", set.clone());
-    }
-    for variant in &args.variant {
-        push("variant", variant.clone());
-    }
+    let option = |name: &str, value: String| format!("--{name} {}", quoted(&value));
+    words.extend(args.from.experiment.iter().map(|path| option("experiment", path.display().to_string())));
+    words.extend(args.from.set.iter().map(|set| option("set", set.clone())));
+    words.extend(args.variant.iter().map(|variant| option("variant", variant.clone())));
     if !args.seeds.is_empty() {
-        push("seeds", args.seeds.iter().map(u64::to_string).collect::<Vec<_>>().join(","));
+        words.push(option("seeds", args.seeds.iter().map(u64::to_string).collect::<Vec<_>>().join(",")));
     }
-    if args.include_seen {
-        words.push("--include-seen".to_owned());
-    }
-    let mut push = |name: &str, value: String| words.push(format!("--{name} {}", quoted(&value)));
+    words.extend(args.include_seen.then(|| "--include-seen".to_owned()));
     if args.compute.device() != DeviceKind::default() {
-        push("device", args.compute.device().to_string());
+        words.push(option("device", args.compute.device().to_string()));
     }
-    push("out", args.out.display().to_string());
+    words.push(option("out", args.out.display().to_string()));
     words.join(" ")
 }
 

@@ -2,7 +2,7 @@
 
 use crate::{
     instructions::macerator::{self, Simd},
-    tile::{LANES, Lanes},
+    tile::{LANES, Lanes, lanes_at},
 };
 use std::ops::Range;
 
@@ -226,9 +226,7 @@ fn largest(x: &[f32], from: Grid, row: usize, column: usize) -> (Lanes, [u32; LA
             // The border is part of the row: the window's corner is one pixel up and left.
             let at =
                 (2 * row + dy + from.border - 1) * from.row() + (2 * column + dx + from.border - 1) * from.channels;
-            let Some(x) = x[at..].first_chunk::<LANES>() else {
-                unreachable!("images have slack behind their last pixel");
-            };
+            let x = lanes_at(x, at);
             let number = (dy * SIDE + dx) as u32;
             for j in 0..LANES {
                 // NaN wins, so that it is not hidden.

@@ -27,9 +27,7 @@ criterion::criterion_group! {
 
 /// As the programs do, so that a machine can be timed as one with narrower vectors.
 fn main() {
-    if let Ok(limit) = std::env::var("PLAYBOT_INSTRUCTIONS") {
-        limit.parse().map(playbot_learner::Instructions::set_limit).expect("a set of instructions");
-    }
+    playbot_learner::limit_by_environment().expect("a set of instructions");
     kernels();
     steps();
     updates();

@@ -12,6 +12,7 @@ use playbot_learner::rng::{Streams, normal};
 use playbot_learner::{
     ActionSpace, Actions, Dataset, DatasetEpisode, DeviceKind, ImageShape, Instructions, Learner, Policy, PolicyOutput,
     PolicySpec, PpoConfig, PpoLearner, Rollout, SacConfig, SacLearner, ScoreConfig, SkillConfig, SkillTrainer,
+    limit_by_environment,
 };
 
 fn numbers(n: usize) -> Vec<f32> {
@@ -101,10 +102,8 @@ const PROCESSES: [(usize, Instructions, &str); 4] = [
 /// in others.
 fn same_everywhere(test: &str, want: u64, digest: fn() -> u64) {
     const CHILD: &str = "PLAYBOT_TEST_THREADS_CHILD";
-    const INSTRUCTIONS: &str = "PLAYBOT_TEST_INSTRUCTIONS";
     if let Some(path) = std::env::var_os(CHILD) {
-        let limit = std::env::var(INSTRUCTIONS).expect("set beside the path");
-        limit.parse().map(Instructions::set_limit).expect("a name");
+        limit_by_environment().expect("a name");
         std::fs::write(path, digest().to_string()).expect("writable");
         return;
     }
@@ -114,7 +113,7 @@ fn same_everywhere(test: &str, want: u64, digest: fn() -> u64) {
         let status = std::process::Command::new(std::env::current_exe().expect("this test"))
             .args(["--exact", &format!("determinism::{test}")])
             .env(CHILD, &path)
-            .env(INSTRUCTIONS, instructions.name())
+            .env("PLAYBOT_INSTRUCTIONS", instructions.name())
             .env("RAYON_NUM_THREADS", threads.to_string())
             .env("GLIBC_TUNABLES", tunables)
             .stdout(std::process::Stdio::null())

@@ -18,7 +18,7 @@ use playbot_harness::{
     split::LevelSplit,
     worlds::Arrangement,
 };
-use playbot_learner::unseal_json;
+use playbot_learner::{settings::is_off, unseal_json};
 use playbot_report::counted;
 use serde::{Deserialize, Serialize};
 use std::{fs, path::Path};
@@ -265,12 +265,8 @@ pub struct TesterRecord {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub run: Option<TestedRun>,
     /// Levels of the tested range that the policy has learned from: by number, as a file, by their layout or their play.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_off")]
     pub known: u64,
-}
-
-fn is_zero(count: &u64) -> bool {
-    *count == 0
 }
 
 /// A checkpoint of a run.
