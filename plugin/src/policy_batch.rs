@@ -144,7 +144,8 @@ impl PolicyRows {
 ///
 /// A pass over a few rows takes a GPU as long as one over thousands. Worlds of a single agent spend more time on the
 /// pass than on computing. So each World gets a thread and a seat. It submits its rows and waits; the last World of a
-/// group computes for the whole group. There are two groups: one simulates while the other is decided for.
+/// group computes for the whole group, on its own thread. Other groups simulate or compute meanwhile. There are two for
+/// a graphics card, and two for each thread on CPUs.
 ///
 /// The result of a row does not depend on the other rows, so the games run as they do alone.
 #[derive(Resource, Clone, Debug, Reflect)]
@@ -155,17 +156,19 @@ pub struct SharedBatch {
     seat: usize,
 }
 
-/// Number of groups: seats of even number make one, those of odd number the other.
+/// Number of groups for a graphics card, and for each thread on CPUs. With two groups seats of even number make one,
+/// those of odd number the other.
 const GROUPS: usize = 2;
 
 impl SharedBatch {
     /// Creates seats for as many Worlds, of which at most `threads` simulate at a time. Each World
     /// runs on its own thread.
     pub fn seats(policy: &Policy, worlds: usize, threads: usize) -> Vec<Self> {
-        let group = |first| Mutex::new(Group { worlds: (first..worlds).step_by(GROUPS).count(), waiting: Vec::new() });
+        let groups = GROUPS * if policy.is_on_host() { threads.clamp(1, worlds.max(1)) } else { 1 };
+        let group = |first| Mutex::new(Group { worlds: (first..worlds).step_by(groups).count(), waiting: Vec::new() });
         let table = Arc::new(Table {
             policy: policy.clone(),
-            groups: std::array::from_fn(group),
+            groups: (0..groups).map(group).collect(),
             free: Mutex::new(threads.max(1)),
             freed: Condvar::new(),
         });
@@ -203,7 +206,8 @@ impl SharedBatch {
 
     /// Changes the group. If all of its Worlds wait then, this thread computes for them.
     fn change(&self, change: impl FnOnce(&mut Group)) {
-        let mut group = lock(&self.table.groups[self.seat % GROUPS]);
+        let groups = &self.table.groups;
+        let mut group = lock(&groups[self.seat % groups.len()]);
         change(&mut group);
         if group.waiting.len() == group.worlds && group.worlds > 0 {
             let waiting = std::mem::take(&mut group.waiting);
@@ -228,7 +232,7 @@ impl Drop for Playing<'_> {
 #[derive(Debug)]
 struct Table {
     policy: Policy,
-    groups: [Mutex<Group>; GROUPS],
+    groups: Vec<Mutex<Group>>,
     /// Number of further Worlds that may simulate. More would compete for the cores.
     free: Mutex<usize>,
     freed: Condvar,

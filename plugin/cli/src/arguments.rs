@@ -70,7 +70,7 @@ pub(crate) const MOST_THREADS: usize = 1024;
 /// The number of threads.
 #[derive(clap::Args, Clone, Copy, Debug)]
 pub struct Threads {
-    /// Threads. The result does not depend on their number.
+    /// Most threads that compute at a time. The result does not depend on their number.
     #[arg(long, default_value_t = threads_for_cores(), value_parser = number_of_threads)]
     threads: usize,
 }

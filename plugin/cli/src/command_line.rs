@@ -19,9 +19,11 @@ use playbot_harness::{
     game::Game,
     games::Games,
     level_files::{LevelFileError, is_level_files},
+    machine::usable_threads,
+    parallel::default_threads,
     split::{LevelSplit, SplitError},
 };
-use playbot_learner::{UnknownDevice, limit_by_environment};
+use playbot_learner::{UnknownDevice, Workers, limit_by_environment};
 use std::{
     error::Error,
     ffi::OsString,
@@ -258,6 +260,22 @@ fn with_width(command: Command, is_on_terminal: bool) -> Command {
 
 fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
     limit_by_environment().map_err(CliError::Usage)?;
+    let threads = match &verb {
+        Verb::Quickstart(args) => args.threads.count(),
+        Verb::LearnSkills(args) => args.compute.threads(),
+        Verb::Train(args) => args.compute.threads(),
+        Verb::Study(args) => args.compute.threads(),
+        Verb::Eval(args) => args.compute.threads(),
+        Verb::Test(args) => args.compute.threads(),
+        Verb::Explore(args) => args.compute.threads(),
+        Verb::Bench(args) => args.threads,
+        _ => usable_threads(default_threads()),
+    };
+    // Networks take no others, wherever they are computed.
+    Workers::new(threads).bound(|| run_on_threads(verb, games))
+}
+
+fn run_on_threads(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
     match verb {
         Verb::Init(args) => init::run(&args),
         Verb::Quickstart(args) => quickstart::run(args, games),

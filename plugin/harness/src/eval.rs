@@ -18,7 +18,7 @@ use bevy_playbot::{
     policy::{ActionDraw, ActivePolicy},
     skill_prior::SkillPrior,
     unknown_name::UnknownName,
-    vision::{ObservationConfig, VisionError},
+    vision::{ObservationConfig, ObservationKind, VisionError},
 };
 use playbot_learner::{HasExitCode, Policy, PolicyFile, settings::is_off};
 use serde::Serialize;
@@ -164,7 +164,7 @@ pub struct EvalPlan {
     pub seed: u64,
     /// Arenas, spread evenly over the Worlds.
     pub arenas: u32,
-    /// Worlds. Their number is part of the plan, as in training.
+    /// Worlds. With more threads arenas are spread over more of them, which changes no result.
     pub worlds: u32,
     /// Threads. They change no result.
     pub threads: usize,
@@ -190,9 +190,14 @@ impl EvalPlan {
     }
 
     /// Returns the arenas that play the plan: those of the plan, or fewer in a game of few arenas for each World. It gets
-    /// no more Worlds than the plan has.
+    /// no more Worlds than the plan has, except for more threads.
     fn arrangement(&self, game: &dyn Game) -> Arrangement {
-        Arrangement::of_agents(game, arenas_within(game, self.arenas, self.worlds), self.worlds)
+        let arrangement = Arrangement::of_agents(game, arenas_within(game, self.arenas, self.worlds), self.worlds);
+        match self.observation_config.kind {
+            // A graphics card draws for few Worlds sooner.
+            ObservationKind::Camera => arrangement,
+            _ => arrangement.for_threads(game, self.threads),
+        }
     }
 
     /// Returns the levels to play, in order.

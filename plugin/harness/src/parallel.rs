@@ -1,5 +1,6 @@
 //! Parallel work on a few threads.
 
+use playbot_learner::Workers;
 use std::{
     io,
     sync::{Mutex, PoisonError},
@@ -8,15 +9,25 @@ use std::{
 };
 
 /// Runs `work` once for every item, on at most `threads` threads, and returns the results in the order of the items.
+/// The networks that it computes take no others: where there are fewer items than threads, each item has its share.
 ///
 /// Results do not depend on the distribution over threads, since each item is worked on alone. If the system starts
 /// fewer threads, the work takes longer.
 pub fn on_threads<T: Send, R: Send>(items: &mut [T], threads: usize, work: impl Fn(&mut T) -> R + Sync) -> Vec<R> {
-    let threads = threads.clamp(1, items.len().max(1));
-    if threads == 1 {
-        return items.iter_mut().map(work).collect();
+    let started = threads.clamp(1, items.len().max(1));
+    if started == 1 {
+        return one_by_one(items, threads, work);
     }
-    share_out(items, threads, Builder::new, &work)
+    // The last threads may be left without items.
+    let started = items.len().div_ceil(items.len().div_ceil(started));
+    let each = |item: &mut T| Workers::new(threads / started).bound(|| work(item));
+    share_out(items, started, Builder::new, &each)
+}
+
+/// Runs `work` once for every item on this thread, for items that are bound to it. The networks that it computes take
+/// at most `threads` threads.
+pub fn one_by_one<T, R>(items: &mut [T], threads: usize, work: impl Fn(&mut T) -> R) -> Vec<R> {
+    Workers::here(threads).bound(|| items.iter_mut().map(work).collect())
 }
 
 fn share_out<T: Send, R: Send>(
@@ -38,7 +49,8 @@ fn share_out<T: Send, R: Send>(
     })
 }
 
-/// Runs `work` once for every item, each on its own thread, for items that wait for one another.
+/// Runs `work` once for every item, each on its own thread, for items that wait for one another. The networks that it
+/// computes take no others.
 ///
 /// # Errors
 ///
@@ -49,10 +61,11 @@ pub fn on_own_threads<T: Send, R: Send>(
     work: impl Fn(&mut T) -> R + Sync,
     give_up: impl Fn(&mut T),
 ) -> io::Result<Vec<R>> {
+    let each = |item: &mut T| Workers::new(1).bound(|| work(item));
     match items {
         // A single item has no other to wait for.
-        [alone] => Ok(vec![work(alone)]),
-        items => each_on_its_own(items, Builder::new, &work, &give_up),
+        [alone] => Ok(vec![each(alone)]),
+        items => each_on_its_own(items, Builder::new, &each, &give_up),
     }
 }
 

@@ -356,6 +356,17 @@ impl Arrangement {
         }
     }
 
+    /// Splits the Worlds into equal parts while there are no more than threads, so that each thread has one. The agents
+    /// and their order stay.
+    pub fn for_threads(self, game: &dyn Game, threads: usize) -> Self {
+        if game.tools().host.agents_per_arena() > 1 {
+            return self;
+        }
+        let most = u32::try_from(threads).unwrap_or(u32::MAX) / self.worlds;
+        let parts = (1..=most.min(self.arenas)).rev().find(|parts| self.arenas.is_multiple_of(*parts)).unwrap_or(1);
+        Self { worlds: self.worlds * parts, arenas: self.arenas / parts }
+    }
+
     /// Returns the number of the first agent of each World.
     pub fn first_agents(self) -> impl Iterator<Item = u32> {
         (0..self.worlds).map(move |world| world * self.arenas)

@@ -25,7 +25,7 @@ use crate::{
     },
     elementwise::{Activation, Store, Write, relu, tanh, vectorized},
     host_numbers::{HostNumbers, tensor},
-    kept_memory::{KeptMemory, share, share_each},
+    kept_memory::{KeptMemory, KeptWeights, share, share_each},
     tile::{LANES, Window, correlate},
 };
 use burn::{
@@ -162,8 +162,19 @@ fn forwards<B: HostNumbers>(
     params: &[FloatTensor<B>],
     activations: &[Option<Activation>],
 ) -> (Vec<KeptMemory>, FloatTensor<B>) {
-    let params = numbers::<B>(params);
-    let (hidden, y) = forward(&B::numbers(x), &layers(&params, activations));
+    let numbers = numbers::<B>(params);
+    let layers = layers(&numbers, activations);
+    let packed = match KeptWeights::are_here() {
+        true => {
+            let weights = params.iter().step_by(2).zip(&layers);
+            weights.map(|(weights, layer)| KeptWeights::of::<B, _>(weights, || Packed::new(layer.matrix()))).collect()
+        }
+        false => {
+            let matrices: Vec<_> = layers.iter().map(Layer::matrix).collect();
+            Packed::all(&matrices).into_iter().map(Arc::new).collect::<Vec<_>>()
+        }
+    };
+    let (hidden, y) = forward(&B::numbers(x), &layers, &packed);
     let n = x.shape()[0];
     let outputs = y.len() / n;
     (hidden, tensor::<B>(y, [n, outputs], &x.device()))
@@ -245,11 +256,10 @@ impl<'a> Layer<'a> {
 }
 
 /// Returns the outputs of all layers but the last, and those of the last, for rows `[n, inputs]`. Needs at least one
-/// layer.
-fn forward(x: &[f32], layers: &[Layer<'_>]) -> (Vec<KeptMemory>, Vec<f32>) {
+/// layer; `packed` holds their weights.
+fn forward(x: &[f32], layers: &[Layer<'_>], packed: &[Arc<Packed>]) -> (Vec<KeptMemory>, Vec<f32>) {
     let (inputs, last) = (layers[0].inputs(), &layers[layers.len() - 1]);
     let n = x.len() / inputs;
-    let packed = Packed::all(&layers.iter().map(Layer::matrix).collect::<Vec<_>>());
     let hidden = layers[..layers.len() - 1].iter().map(|layer| KeptMemory::take(n * layer.outputs()));
     let (mut hidden, mut out): (Vec<KeptMemory>, _) = (hidden.collect(), vec![0.0; n * last.outputs()]);
     let outputs = hidden.iter_mut().map(|hidden| &mut **hidden).chain([&mut *out]);
@@ -257,7 +267,7 @@ fn forward(x: &[f32], layers: &[Layer<'_>]) -> (Vec<KeptMemory>, Vec<f32>) {
     share_each(&mut pieces, n * products(layers), |piece, outputs| {
         let mut x = &x[piece * ROWS * inputs..];
         let mut stride = inputs;
-        for ((layer, weights), out) in layers.iter().zip(&packed).zip(outputs) {
+        for ((layer, weights), out) in layers.iter().zip(packed).zip(outputs) {
             rows_product(out, weights.columns, x, stride, weights, layer.bias);
             match layer.activation {
                 None => {}

@@ -7,10 +7,9 @@
 
 use crate::{
     instructions::macerator::{AutoArch, Simd, WithSimd},
-    kept_memory::share,
+    kept_memory::{OF_A_MOVE, share},
     tile::{LANES, Lanes},
 };
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Numbers that one thread takes at a time.
@@ -115,14 +114,17 @@ pub fn vectorized(loops: impl FnOnce()) {
 
 /// Replaces each number by its tanh.
 pub(crate) fn tanh_in_place(values: &mut [f32]) {
-    values.par_chunks_mut(CHUNK).for_each(|chunk| vectorized(|| chunk.iter_mut().for_each(|x| *x = tanh(*x))));
+    let products = values.len() * OF_AN_EXP;
+    share(values, CHUNK, products, |_, chunk| vectorized(|| chunk.iter_mut().for_each(|x| *x = tanh(*x))));
 }
 
 /// Multiplies each number of `grad` by tanh' = 1 - y², where y is the tanh.
 pub(crate) fn tanh_backward(grad: &mut [f32], tanh: &[f32]) {
-    grad.par_chunks_mut(CHUNK)
-        .zip(tanh.par_chunks(CHUNK))
-        .for_each(|(grad, y)| vectorized(|| grad.iter_mut().zip(y).for_each(|(g, &y)| *g *= 1.0 - y * y)));
+    let products = grad.len() * OF_A_MOVE;
+    share(grad, CHUNK, products, |piece, grad| {
+        let tanh = &tanh[piece * CHUNK..];
+        vectorized(|| grad.iter_mut().zip(tanh).for_each(|(g, &y)| *g *= 1.0 - y * y));
+    });
 }
 
 /// Returns the number if it is positive, otherwise 0; NaN stays NaN.

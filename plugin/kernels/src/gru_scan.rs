@@ -10,9 +10,8 @@
 use crate::{
     dense::{LayerSums, Matrix, Packed, SumGrads, param_grads, product_into},
     elementwise::{sigmoid, tanh, vectorized},
-    kept_memory::KeptMemory,
+    kept_memory::{KeptMemory, share_each},
 };
-use rayon::prelude::*;
 
 // Sizes, inputs and intermediate results of a recurrent layer's sequence.
 
@@ -86,6 +85,14 @@ fn of_direction(all: &[f32], d: usize, directions: usize) -> &[f32] {
     &all[d * len..(d + 1) * len]
 }
 
+/// Returns the result of each direction, which threads share.
+fn each_direction<T: Send>(sizes: Sizes, of_direction: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    let mut found: Vec<Option<T>> = (0..sizes.directions).map(|_| None).collect();
+    let products = sizes.directions * sizes.rows() * sizes.gates() * (sizes.inputs + sizes.hidden);
+    share_each(&mut found, products, |d, found| *found = Some(of_direction(d)));
+    found.into_iter().flatten().collect()
+}
+
 // The forward pass: the states from the inputs.
 
 /// Returns the outputs `[T * B, directions * hidden]`, with the biases of input and state, `[directions, 3 * hidden]`
@@ -96,7 +103,7 @@ pub fn forward(
     initial: &[f32],
     sizes: Sizes,
 ) -> (Vec<f32>, ScanRecord) {
-    let runs = (0..sizes.directions).into_par_iter().map(|d| {
+    let runs = each_direction(sizes, |d| {
         let part = |all| of_direction(all, d, sizes.directions);
         let packed = |numbers, rows| Packed::new(Matrix { numbers, rows, columns: sizes.gates(), is_turned: false });
         let weights = packed(part(input.weight_ih), sizes.inputs);
@@ -105,7 +112,6 @@ pub fn forward(
         let weights = packed(part(input.weight_hh), sizes.hidden);
         scan(&sums, &weights, part(bias_hh), part(initial), d == 1, sizes)
     });
-    let runs: Vec<Direction> = runs.collect();
     (joined(&runs, sizes), ScanRecord { sizes, directions: runs })
 }
 
@@ -196,10 +202,10 @@ pub struct Wanted {
 /// Returns the gradients for `output`, the gradient of the outputs.
 pub fn backward(output: &[f32], input: ScanInput<'_>, scan: &ScanRecord, wanted: Wanted) -> ScanGrads {
     let sizes = scan.sizes;
-    let parts = scan.directions.par_iter().enumerate().map(|(d, run)| {
+    let parts = each_direction(sizes, |d| {
         let part = |all| of_direction(all, d, sizes.directions);
         let weights = (part(input.weight_ih), part(input.weight_hh));
-        of_one_direction(output, input.x, weights, d, run, wanted, sizes)
+        of_one_direction(output, input.x, weights, d, &scan.directions[d], wanted, sizes)
     });
     let mut all = ScanGrads {
         x: Vec::new(),
@@ -209,7 +215,7 @@ pub fn backward(output: &[f32], input: ScanInput<'_>, scan: &ScanRecord, wanted:
         bias_hh: Vec::new(),
         initial: Vec::new(),
     };
-    for part in parts.collect::<Vec<ScanGrads>>() {
+    for part in parts {
         if all.x.is_empty() {
             all.x = part.x;
         } else {

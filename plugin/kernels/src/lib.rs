@@ -13,7 +13,7 @@
 //! - [`instructions`]: the vector instructions of the loops, on which no number depends.
 //! - [`host_numbers`]: conversion between tensors and numbers in host memory.
 //! - [`among_workers`]: the threads on which the loops run.
-//! - [`kept_memory`]: memory that one pass hands to the next.
+//! - [`kept_memory`]: memory and weights that one pass hands to the next.
 
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
 

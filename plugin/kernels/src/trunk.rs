@@ -23,7 +23,7 @@ mod winograd;
 use crate::{
     elementwise::{Add, AddWhere, Write, WriteRelu, relu, relu_backward, vectorized},
     host_numbers::{HostNumbers, tensor},
-    kept_memory::KeptMemory,
+    kept_memory::{KeptMemory, KeptWeights, OF_A_MOVE, share, share_each, share_with},
     tile::{LANES, Lanes},
     trunk::{
         grid::ConvShape,
@@ -44,7 +44,6 @@ use burn::{
     },
     tensor::{Device, Tensor},
 };
-use rayon::prelude::*;
 use std::{iter, sync::Arc};
 
 pub use crate::trunk::grid::window_places;
@@ -62,8 +61,9 @@ pub fn features(pixels: &Tensor<4>, stages: &[TrunkStage<'_>]) -> Option<Tensor<
     let shapes: Vec<StageShape> = stages.iter().map(TrunkStage::shape).collect();
     let plan = Plan::new(&shapes, [channels, height, width])?;
     let flat = |conv: Conv<'_>| -> [Tensor<1>; 2] { [conv.weight.clone().flatten(0, 3), conv.bias.clone()] };
+    let first = stages.iter().flat_map(TrunkStage::convs).next()?.weight.clone();
     let params = stages.iter().flat_map(TrunkStage::convs).flat_map(flat).collect();
-    Some(trunk(pixels.clone(), Tensor::cat(params, 0), Arc::new(plan)))
+    Some(trunk(pixels.clone(), Tensor::cat(params, 0), first, Arc::new(plan)))
 }
 
 /// Parameters of a convolution with a square kernel.
@@ -120,28 +120,45 @@ fn is_flex(device: &Device) -> bool {
     matches!(device.clone().inner().as_dispatch(), DispatchDevice::Flex(_))
 }
 
-/// Returns the features of `pixels`, on flex; `params` has the parameters of all layers, one after the other.
-fn trunk(pixels: Tensor<4>, params: Tensor<1>, plan: Arc<Plan>) -> Tensor<2> {
-    Tensor::from_dispatch(Dispatch::trunk(pixels.into_dispatch(), params.into_dispatch(), plan))
+/// Returns the features of `pixels`, on flex; `params` has the parameters of all layers, one after the other, and
+/// `first` are the weights of the first, by which the network is known.
+fn trunk(pixels: Tensor<4>, params: Tensor<1>, first: Tensor<4>, plan: Arc<Plan>) -> Tensor<2> {
+    Tensor::from_dispatch(Dispatch::trunk(pixels.into_dispatch(), params.into_dispatch(), first.into_dispatch(), plan))
 }
 
 /// A backend with trunks.
 #[backend_extension(Flex, Autodiff)]
 trait Trunks: Backend {
     /// Returns the features as [`trunk`] does.
-    fn trunk(pixels: FloatTensor<Self>, params: FloatTensor<Self>, plan: Arc<Plan>) -> FloatTensor<Self>;
+    fn trunk(
+        pixels: FloatTensor<Self>,
+        params: FloatTensor<Self>,
+        first: FloatTensor<Self>,
+        plan: Arc<Plan>,
+    ) -> FloatTensor<Self>;
 }
 
 impl Trunks for Flex {
-    fn trunk(pixels: FloatTensor<Self>, params: FloatTensor<Self>, plan: Arc<Plan>) -> FloatTensor<Self> {
-        let weights = weights(&plan, &Self::numbers(&params), false);
+    fn trunk(
+        pixels: FloatTensor<Self>,
+        params: FloatTensor<Self>,
+        first: FloatTensor<Self>,
+        plan: Arc<Plan>,
+    ) -> FloatTensor<Self> {
+        let ordered = || weights(&plan, &Self::numbers(&params), false);
+        let weights = KeptWeights::of::<Self, _>(&first, ordered);
         let values = features_of_images(&plan, &weights, &Self::numbers(&pixels));
         tensor::<Self>(values, [pixels.shape()[0], plan.features()], &pixels.device())
     }
 }
 
 impl<B: Trunks + HostNumbers, C: CheckpointStrategy> Trunks for Autodiff<B, C> {
-    fn trunk(pixels: FloatTensor<Self>, params: FloatTensor<Self>, plan: Arc<Plan>) -> FloatTensor<Self> {
+    fn trunk(
+        pixels: FloatTensor<Self>,
+        params: FloatTensor<Self>,
+        first: FloatTensor<Self>,
+        plan: Arc<Plan>,
+    ) -> FloatTensor<Self> {
         let ((pixels, _), (params, node)) = (pixels.into_parts(), params.into_parts());
         match Convolutions.prepare::<C>([node]).compute_bound().stateful() {
             OpsKind::Tracked(prep) => {
@@ -150,7 +167,7 @@ impl<B: Trunks + HostNumbers, C: CheckpointStrategy> Trunks for Autodiff<B, C> {
                 let values = tensor::<B>(values, [pixels.shape()[0], plan.features()], &pixels.device());
                 prep.finish(Arc::new(Run { plan, weights, saved }), values)
             }
-            OpsKind::UnTracked(prep) => prep.finish(B::trunk(pixels, params, plan)),
+            OpsKind::UnTracked(prep) => prep.finish(B::trunk(pixels, params, first.into_parts().0, plan)),
         }
     }
 }
@@ -187,14 +204,19 @@ fn weights(plan: &Plan, mut params: &[f32], backward: bool) -> Vec<Weights> {
         of_layers.push(own);
         params = rest;
     }
-    let weights = plan.layers.par_iter().zip(of_layers).map(|(layer, params)| layer.weights(params, backward));
-    weights.collect()
+    let numbers: usize = of_layers.iter().map(|params| params.len()).sum();
+    let mut found: Vec<_> = plan.layers.iter().zip(of_layers).map(|(layer, params)| (layer, params, None)).collect();
+    share_each(&mut found, numbers * OF_A_MOVE, |_, (layer, params, to)| *to = Some(layer.weights(params, backward)));
+    found.into_iter().filter_map(|(_, _, weights)| weights).collect()
 }
 
 // The forward pass: from images to features.
 
-/// Smallest number of images that a thread takes at a time.
+/// Number of images that a thread takes at a time.
 const IMAGES: usize = 4;
+
+/// Number of products that take as long as the smallest of networks for an image.
+const OF_AN_IMAGE: usize = 1 << 20;
 
 /// The activations of all images for the backward pass.
 #[derive(Debug)]
@@ -207,12 +229,16 @@ struct SavedActivations {
 
 /// Returns only the features `[n, Plan::features]` of the images `[n, channels, height, width]`.
 fn features_of_images(plan: &Plan, weights: &[Weights], images: &[f32]) -> Vec<f32> {
-    let mut out = vec![0.0; images.len() / image_len(plan) * plan.features()];
-    let work = out.par_chunks_mut(plan.features()).zip(images.par_chunks(image_len(plan))).with_min_len(IMAGES);
+    let n = images.len() / image_len(plan);
+    let mut out = vec![0.0; n * plan.features()];
     let scratch = || (Workspace::new(plan), vec![0.0; plan.lean.len], vec![0; plan.marks]);
-    work.for_each_init(scratch, |(work, values, marks), (out, image)| {
-        forward(plan, &plan.lean, weights, image, work, values, marks);
-        write(plan, &plan.lean, values, out);
+    let piece = IMAGES * plan.features();
+    share_with(&mut out, piece, n * OF_AN_IMAGE, scratch, |(work, values, marks), piece, out| {
+        let images = images.chunks_exact(image_len(plan)).skip(piece * IMAGES);
+        for (out, image) in out.chunks_exact_mut(plan.features()).zip(images) {
+            forward(plan, &plan.lean, weights, image, work, values, marks);
+            write(plan, &plan.lean, values, out);
+        }
     });
     out
 }
@@ -222,19 +248,25 @@ fn features_and_saved(plan: &Plan, weights: &[Weights], images: &[f32]) -> (Vec<
     let n = images.len() / image_len(plan);
     let mut out = vec![0.0; n * plan.features()];
     let mut saved = SavedActivations { values: KeptMemory::take(n * plan.kept.len), marks: vec![0; n * plan.marks] };
-    let images = images.par_chunks(image_len(plan)).with_min_len(IMAGES);
-    let work = out.par_chunks_mut(plan.features()).zip(images);
-    let work = work.zip(saved.values.par_chunks_mut(plan.kept.len).zip(saved.marks.par_chunks_mut(plan.marks)));
-    work.for_each_init(
+    let memory = saved.values.chunks_mut(plan.kept.len).zip(saved.marks.chunks_mut(plan.marks));
+    let images = images.chunks_exact(image_len(plan));
+    let mut all: Vec<_> = out.chunks_exact_mut(plan.features()).zip(images).zip(memory).collect();
+    share_with(
+        &mut all,
+        IMAGES,
+        n * OF_AN_IMAGE,
         || Workspace::new(plan),
-        |work, ((out, image), (values, marks))| {
-            for (slot, grid) in plan.slots.iter().enumerate() {
-                grid.clear_border(plan.kept.write(slot, values));
+        |work, _, images| {
+            for ((out, image), (values, marks)) in images {
+                for (slot, grid) in plan.slots.iter().enumerate() {
+                    grid.clear_border(plan.kept.write(slot, values));
+                }
+                forward(plan, &plan.kept, weights, image, work, values, marks);
+                write(plan, &plan.kept, values, out);
             }
-            forward(plan, &plan.kept, weights, image, work, values, marks);
-            write(plan, &plan.kept, values, out);
         },
     );
+    drop(all);
     (out, saved)
 }
 
@@ -289,6 +321,9 @@ const PARTS: usize = 32;
 /// Smallest number of images of a part.
 const BACKWARD_IMAGES: usize = 8;
 
+/// Sums of a part that a thread adds at a time.
+const SUMS: usize = 1 << 13;
+
 /// Returns the gradients of all parameters, layer by layer, for the gradient `[n, Plan::features]` of the features.
 ///
 /// The parts depend on the batch alone and are added in order, so the sums are the same on any number of threads.
@@ -299,7 +334,8 @@ fn gradients(plan: &Plan, weights: &[Weights], saved: &SavedActivations, grad: &
     let at_once = if group.is_some() { layer::IMAGES } else { 1 };
     let (kept_len, lean_len) = (plan.kept.len, plan.lean.len);
     let memory = || (Workspace::new(plan), KeptMemory::zeros(at_once * lean_len));
-    let parts = (0..n.div_ceil(part)).into_par_iter().map_init(memory, |(work, grads), i| {
+    let mut parts: Vec<Option<KeptMemory>> = (0..n.div_ceil(part)).map(|_| None).collect();
+    share_with(&mut parts, 1, n * OF_AN_IMAGE, memory, |(work, grads), i, of_part| {
         let mut memory = KeptMemory::zeros(plan.layers.iter().map(Layer::sums).sum::<usize>() * LANES);
         let mut sums: Vec<&mut [Lanes]> = by_layer(plan, memory.as_chunks_mut().0, Layer::sums);
         let end = n.min((i + 1) * part);
@@ -319,25 +355,23 @@ fn gradients(plan: &Plan, weights: &[Weights], saved: &SavedActivations, grad: &
                 group.add_gradients(plan, images.len(), values, grads, &mut sums);
             }
         }
-        memory
+        of_part[0] = Some(memory);
     });
-    let mut parts: Vec<KeptMemory> = parts.collect();
+    let mut parts: Vec<KeptMemory> = parts.into_iter().flatten().collect();
     let mut params = KeptMemory::take(plan.layers.iter().map(Layer::params).sum()).into_vec();
     let Some((total, others)) = parts.split_first_mut() else { return vec![0.0; params.len()] };
-    let mut first = 0;
-    let totals = by_layer(plan, total.as_chunks_mut::<LANES>().0, Layer::sums).into_iter().map(|total| {
-        first += total.len();
-        (first - total.len(), total)
-    });
-    let of_layers: Vec<_> = totals.zip(by_layer(plan, &mut params, Layer::params)).collect();
-    plan.layers.par_iter().zip(of_layers).for_each(|(layer, ((first, total), params))| {
+    let adds = others.len() * total.len();
+    share(total, SUMS, adds * OF_A_MOVE, |piece, total| {
         for part in &*others {
-            let sums = &part.as_chunks::<LANES>().0[first..][..total.len()];
-            let pairs = total.as_flattened_mut().iter_mut().zip(sums.as_flattened());
+            let pairs = total.iter_mut().zip(&part[piece * SUMS..]);
             vectorized(|| pairs.for_each(|(sum, x)| *sum += x));
         }
-        layer.gradients(total, params);
     });
+    let totals = by_layer(plan, total.as_chunks_mut::<LANES>().0, Layer::sums);
+    let of_layers = plan.layers.iter().zip(totals).zip(by_layer(plan, &mut params, Layer::params));
+    let mut of_layers: Vec<_> = of_layers.collect();
+    share_each(&mut of_layers, adds * OF_A_MOVE, |_, ((layer, total), params)| layer.gradients(total, params));
+    drop(of_layers);
     params
 }
 

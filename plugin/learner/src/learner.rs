@@ -96,10 +96,9 @@ pub trait Learner: Debug + Send {
         self.base().streams.seed()
     }
 
-    /// Returns the time spent assembling minibatches, out of rollouts or a replay buffer, since this learner was
-    /// made. It is not saved.
-    fn gathering(&self) -> Duration {
-        self.base().gathering
+    /// Returns the time spent on gradient steps since this learner was made. It is not saved.
+    fn times(&self) -> LearnTimes {
+        self.base().times
     }
 
     /// Returns the settings of SCORE, with a skill model.
@@ -117,6 +116,38 @@ pub trait Learner: Debug + Send {
     fn skills(&self) -> Option<SkillSource> {
         let base = self.base();
         base.teacher.as_ref().map(|teacher| teacher.source(base.device))
+    }
+}
+
+/// Time that a learner has spent on gradient steps, by the clock.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LearnTimes {
+    /// All of it.
+    pub steps: Duration,
+    /// Assembling minibatches, out of rollouts or a replay buffer.
+    pub gather: Duration,
+    /// Steps of the optimiser. A graphics card may go on with one while the next minibatch is prepared.
+    pub optimise: Duration,
+}
+
+impl LearnTimes {
+    /// Returns the time of the products and sums in networks and losses, forward and backward.
+    pub fn products(&self) -> Duration {
+        self.steps.saturating_sub(self.gather).saturating_sub(self.optimise)
+    }
+
+    /// Combines two times.
+    pub(crate) fn zip(self, other: Self, combine: fn(Duration, Duration) -> Duration) -> Self {
+        Self {
+            steps: combine(self.steps, other.steps),
+            gather: combine(self.gather, other.gather),
+            optimise: combine(self.optimise, other.optimise),
+        }
+    }
+
+    /// Returns the time since `before`, an earlier value.
+    pub fn since(self, before: Self) -> Self {
+        self.zip(before, Duration::saturating_sub)
     }
 }
 
@@ -159,8 +190,8 @@ pub struct LearnerBase {
     /// Number of rollouts learned from.
     pub(crate) updates: u64,
     pub(crate) device: DeviceKind,
-    /// Time spent assembling minibatches since this learner was made.
-    pub(crate) gathering: Duration,
+    /// Time spent on gradient steps since this learner was made.
+    pub(crate) times: LearnTimes,
 }
 
 impl LearnerBase {
@@ -190,7 +221,7 @@ impl LearnerBase {
             streams: Streams::new(seed),
             updates: 0,
             device,
-            gathering: Duration::ZERO,
+            times: LearnTimes::default(),
         })
     }
 

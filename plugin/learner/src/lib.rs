@@ -66,7 +66,7 @@ pub use crate::{
     disk::{write_atomically, write_atomically_with},
     error::{FileError, HasExitCode, LearnError, SettingError, brief_number, io_exit_code},
     file::{BrokenSeal, Unsealed, seal_json, seal_text, unseal_json, unseal_text},
-    learner::{ContinuedSchedule, Learner, LearnerBase, LearnerMetrics},
+    learner::{ContinuedSchedule, LearnTimes, Learner, LearnerBase, LearnerMetrics},
     norm::RewardReset,
     observation::{Augmentation, ImageShape, ObsKind, ObsSlice, Observations, PictureMetadata},
     policy::{Policy, PolicyOutput, StdKind},
@@ -85,7 +85,7 @@ pub use crate::{
     spirl::{SpirlConfig, SpirlLearner},
 };
 pub use playbot_kernels::{
-    among_workers::{among_awake_workers, among_workers, waited},
+    among_workers::{Workers, among_awake_workers, among_workers, shared_time, waited},
     instructions::{Instructions, limit_by_environment},
 };
 

@@ -1,6 +1,7 @@
 //! Normalisation of observations and rewards: running, and for observations also frozen.
 
 use crate::{FileError, LearnError, file::TensorFile};
+use playbot_kernels::kept_memory::{OF_A_MOVE, share};
 use serde::{Deserialize, Serialize};
 
 /// Added to the variance.
@@ -8,6 +9,9 @@ const EPS: f64 = 1e-8;
 
 /// Bound to which normalised observations are clipped.
 const CLIP: f64 = 10.0;
+
+/// Dimensions of running statistics that a thread takes at a time.
+const DIMS: usize = 8;
 
 /// Deviation below which a dimension counts as constant.
 const CONSTANT: f64 = 1e-3;
@@ -77,8 +81,7 @@ impl ObsNormalizer {
 
     /// Adds rows of observations.
     pub fn update(&mut self, rows: &[f32]) {
-        let n = rows.len() / self.stats.dim().max(1);
-        self.stats.update(rows.iter().map(|&x| f64::from(x)), n);
+        self.stats.update_rows(rows);
     }
 
     /// Returns the present mean and scale 1/√(var + 1e-8).
@@ -232,14 +235,41 @@ impl RunningStats {
             mean[i % dim] += x;
         }
         mean.iter_mut().for_each(|m| *m /= count);
-        let mut var = vec![0.0; dim];
+        let mut squares = vec![0.0; dim];
         for (i, x) in rows.take(n * dim).enumerate() {
-            var[i % dim] += (x - mean[i % dim]).powi(2);
+            squares[i % dim] += (x - mean[i % dim]).powi(2);
         }
+        self.add(mean.into_iter().zip(squares), count);
+    }
+
+    /// Does [`Self::update`] for many rows, with threads that take a few dimensions each.
+    fn update_rows(&mut self, rows: &[f32]) {
+        let dim = self.dim();
+        let count = rows.len().checked_div(dim).unwrap_or_default() as f64;
+        if count == 0.0 {
+            return;
+        }
+        let mut batch = vec![(0.0, 0.0); dim];
+        share(&mut batch, DIMS, 2 * rows.len() * OF_A_MOVE, |piece, batch| {
+            let parts = || rows.chunks_exact(dim).map(|row| &row[piece * DIMS..]);
+            for part in parts() {
+                batch.iter_mut().zip(part).for_each(|((mean, _), &x)| *mean += f64::from(x));
+            }
+            batch.iter_mut().for_each(|(mean, _)| *mean /= count);
+            for part in parts() {
+                let pairs = batch.iter_mut().zip(part);
+                pairs.for_each(|((mean, squares), &x)| *squares += (f64::from(x) - *mean).powi(2));
+            }
+        });
+        self.add(batch.into_iter(), count);
+    }
+
+    /// Adds a batch of `count` rows, by the mean and the sum of squared deviations of each dimension.
+    fn add(&mut self, batch: impl Iterator<Item = (f64, f64)>, count: f64) {
         let total = self.count + count;
-        for d in 0..dim {
-            let delta = mean[d] - self.mean[d];
-            let spread = var[d] + self.var[d] * self.count + delta * delta * self.count * count / total;
+        for (d, (mean, squares)) in batch.enumerate() {
+            let delta = mean - self.mean[d];
+            let spread = squares + self.var[d] * self.count + delta * delta * self.count * count / total;
             self.mean[d] += delta * count / total;
             self.var[d] = spread / total;
         }
@@ -328,6 +358,24 @@ mod tests {
         let want = [2.0 / 5.0f32.sqrt(), 0.0, 0.0, -10.0, 3.0, 1.0];
         assert!(got.iter().zip(want).all(|(g, w)| (g - w).abs() < 1e-4), "{got:?}, expected {want:?}");
         assert_eq!(ObsStats::of(std::iter::empty(), 2).normalize(&[3.0, -4.0]), [3.0, -4.0]);
+    }
+
+    #[test]
+    fn many_rows_are_added_as_their_numbers_one_by_one() {
+        let (dim, mut rng) = (19, crate::rng::Streams::new(1).stream("rows", 0));
+        let rows: Vec<f32> = (0..dim * 3000 + 5).map(|_| 3.0 + crate::rng::normal(&mut rng)).collect();
+        let mut one_by_one = RunningStats::new(dim);
+        one_by_one.update(rows.iter().map(|&x| f64::from(x)), 3000);
+        for threads in [1, 3] {
+            let mut normalizer = ObsNormalizer::new(dim);
+            crate::Workers::new(threads).bound(|| crate::among_awake_workers(|| normalizer.update(&rows)));
+            assert_eq!(normalizer.stats, one_by_one, "on {threads} threads");
+            normalizer.update(&[1.0; 18]);
+            assert_eq!(normalizer.stats, one_by_one, "no whole row");
+        }
+        let mut empty = ObsNormalizer::new(0);
+        empty.update(&[]);
+        assert_eq!(empty.stats, RunningStats::new(0));
     }
 
     #[test]

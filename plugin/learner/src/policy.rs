@@ -19,7 +19,7 @@ use crate::{
     norm::ObsStats,
 };
 use burn::tensor::{Device, Tensor};
-use playbot_kernels::host_numbers::is_host;
+use playbot_kernels::{host_numbers::is_host, kept_memory::KeptWeights};
 use rand::Rng;
 use std::sync::Arc;
 
@@ -49,6 +49,7 @@ pub struct Policy {
     pub(crate) stats: Option<Arc<ObsStats>>,
     spec: PolicySpec,
     device: Device,
+    kept: KeptWeights,
 }
 
 impl Policy {
@@ -60,7 +61,8 @@ impl Policy {
         spec: PolicySpec,
         device: Device,
     ) -> Self {
-        Self { actor: frozen(actor), critic: critic.map(frozen), stats, spec, device }
+        let (actor, critic) = (frozen(actor), critic.map(frozen));
+        Self { actor, critic, stats, spec, device, kept: KeptWeights::default() }
     }
 
     /// Returns its inputs and outputs.
@@ -215,7 +217,7 @@ impl Policy {
             ObsKind::Vector(_) => VECTORS_AT_A_TIME,
             ObsKind::Image(_) => IMAGES_AT_A_TIME,
         };
-        guarded(&self.device, || {
+        let pass = || {
             for start in (0..n).step_by(chunk) {
                 let rows: Vec<usize> = (start..(start + chunk).min(n)).collect();
                 let len = rows.len();
@@ -227,7 +229,8 @@ impl Policy {
                 }
             }
             Ok(())
-        })
+        };
+        self.kept.during(|| guarded(&self.device, pass))
     }
 }
 

@@ -249,13 +249,17 @@ impl PpoLearner {
         self.prepare_adam(is_warming_up);
         let moment = UpdateSettings { lr, score: score.as_ref(), is_warming_up };
         let mut rng = self.base.streams.stream("ppo.minibatches", self.base.updates);
+        let before = self.adam.spent();
         let sum = if is_host(&self.base.device.plain()) {
             self.steps(&batch, &mut rng, &moment)?
         } else {
             self.steps_on_device(&batch, &mut rng, &moment)?
         };
         self.base.updates += 1;
-        self.base.gathering += batch.gathering.get();
+        let times = &mut self.base.times;
+        times.steps += start.elapsed();
+        times.gather += batch.gathering.get();
+        times.optimise += self.adam.spent() - before;
         if let (Some(normalizer), Observations::Vector(values)) = (&mut self.base.observations, &rollout.obs) {
             normalizer.update(values);
         }

@@ -38,7 +38,10 @@ use crate::{
 };
 use burn::tensor::Tensor;
 use serde::{Deserialize, Serialize};
-use std::{path::Path, time::Instant};
+use std::{
+    path::Path,
+    time::{Duration, Instant},
+};
 
 pub(crate) use crate::sac::buffer::check_ends;
 pub use crate::sac::{
@@ -336,9 +339,12 @@ impl SacLearner {
         self.buffer.push(rollout, weights)?;
         let mut sums = MetricSums::default();
         let due = self.steps_due(rollout.rows());
+        let (start, before) = (Instant::now(), self.optimizers.spent());
         for _ in 0..due {
             self.gradient_step(&mut sums)?;
         }
+        self.base.times.steps += start.elapsed();
+        self.base.times.optimise += self.optimizers.spent() - before;
         self.base.updates += 1;
         let penalised = self.base.prior_origin().is_some() || self.base.score_config().is_some_and(|score| score.kl);
         let entropy_coef = if due > 0 { Some(self.temperature()? as f32) } else { None };
@@ -367,7 +373,7 @@ impl SacLearner {
         let with_actor = !is_warming_up && self.gradient_steps.is_multiple_of(self.config.actor_every);
         let start = Instant::now();
         let batch = self.batch(&drawn, seen_by_target, with_actor)?;
-        self.base.gathering += start.elapsed();
+        self.base.times.gather += start.elapsed();
         let noise = self.noise(&mut rng);
         let (temperature, config) = (self.temperature()?, &self.config);
         let (nets, adam) = (&mut self.nets, &mut self.optimizers.critics);
@@ -466,6 +472,11 @@ impl Optimizers {
     fn new(config: &SacConfig) -> Self {
         let adam = || Adam::new(AdamConfig { eps: config.adam_eps, ..AdamConfig::default() });
         Self { critics: adam(), actor: adam(), temperature: adam() }
+    }
+
+    /// Returns the time spent on steps so far.
+    fn spent(&self) -> Duration {
+        [&self.critics, &self.actor, &self.temperature].iter().map(|adam| adam.spent()).sum()
     }
 
     /// Takes the moments out of a checkpoint.

@@ -16,7 +16,7 @@ mod skill_steps;
 use crate::{
     DeviceKind, FileError, LearnError, ObsSlice, PolicySpec, PpoLearner, Rollout, SacLearner, TimeLimit,
     file::{FileKind, TensorFile},
-    learner::{ContinuedSchedule, Learner, LearnerBase, LearnerMetrics},
+    learner::{ContinuedSchedule, LearnTimes, Learner, LearnerBase, LearnerMetrics},
     policy::Policy,
     ppo::PpoConfig,
     sac::{EntropyCoef, SacConfig},
@@ -27,7 +27,7 @@ use crate::{
     spirl::over_skills::{OverSkills, of_prior, tag_of_skills},
 };
 use serde::{Deserialize, Serialize};
-use std::{path::Path, time::Duration};
+use std::path::Path;
 
 /// Learns which skills to play.
 ///
@@ -208,8 +208,9 @@ impl Learner for SpirlLearner {
         self.over_skills.teacher().latent()
     }
 
-    fn gathering(&self) -> Duration {
-        self.base().gathering + self.below.as_ref().map_or(Duration::ZERO, |below| below.gathering())
+    fn times(&self) -> LearnTimes {
+        let below = self.below.as_ref().map(|below| below.times()).unwrap_or_default();
+        self.base().times.zip(below, |one, other| one + other)
     }
 
     fn prior(&self) -> Option<Prior> {

@@ -43,7 +43,7 @@ use bevy_playbot::{
     state_hash::StateHash,
 };
 use playbot_harness::{defect::DefectKind, game::Game, split::LevelSplit};
-use playbot_learner::{seal_json, unseal_json, write_atomically};
+use playbot_learner::{Workers, seal_json, unseal_json, write_atomically};
 use playbot_test::{
     detectors::{Detectors, own_detectors},
     findings::{Breakage, Lengths},
@@ -404,12 +404,15 @@ impl<'a> ScoreRun<'a> {
         }
         let threads = self.plan.threads.clamp(1, open.len().max(1));
         let shared = Mutex::new(Shared { next: 0, journal: &mut *journal, failure: None, is_stopped: false });
+        // Networks take no other threads.
+        let workers = || Workers::new(self.plan.threads / threads);
+        let run = || workers().bound(|| self.work(&open, &shared, watch));
         thread::scope(|scope| {
             for _ in 1..threads {
                 // With fewer threads than asked for, the score only takes longer.
-                let _ = Builder::new().spawn_scoped(scope, || self.work(&open, &shared, watch));
+                let _ = Builder::new().spawn_scoped(scope, run);
             }
-            self.work(&open, &shared, watch);
+            run();
         });
         let Shared { failure, is_stopped, .. } = shared.into_inner().unwrap_or_else(PoisonError::into_inner);
         match failure {

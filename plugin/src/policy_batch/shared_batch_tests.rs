@@ -86,7 +86,7 @@ fn rows_that_do_not_fit_are_reported_to_all_of_the_group() {
                 seat.decide(&mut rows).err().unwrap_or_default()
             })
         };
-        let threads: Vec<_> = SharedBatch::seats(&policy, 4, 2).into_iter().enumerate().map(play).collect();
+        let threads: Vec<_> = SharedBatch::seats(&policy, 4, 1).into_iter().enumerate().map(play).collect();
         threads.into_iter().map(|thread| thread.join().expect("no panic")).collect()
     });
     assert!(failed[0].contains("observations") && failed[0] == failed[2], "{failed:?}");

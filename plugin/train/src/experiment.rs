@@ -71,8 +71,8 @@ settings! {
     steps: u64, in Range::Count(1 << 53), such as "1000000";
     /// Arenas that play at the same time.
     arenas: u32 = default_arenas(), in Range::COUNT, serde(default = "default_arenas");
-    /// Worlds the arenas are spread over. Each World plays on a thread of its own. Part of the experiment, since the
-    /// rows of a batch are computed together; the number of other threads is not.
+    /// Worlds the arenas are spread over. Each World plays on a thread of its own. With more threads arenas are spread
+    /// over more Worlds, which changes no result.
     worlds: u32 = default_worlds(), in Range::Count(MOST_WORLDS), serde(default = "default_worlds");
     /// The skill model.
     skills: SkillConfig, keys of SkillConfig, serde(default);

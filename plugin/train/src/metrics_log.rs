@@ -93,10 +93,42 @@ impl UpdateReport {
 /// Wall-clock seconds of one update.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Timing {
-    /// Simulating, observing and deciding.
+    /// Simulating, observing and deciding, and joining the parts of all Worlds.
     pub collect_s: f64,
-    /// Learning.
+    /// Learning, and all else.
     pub learn_s: f64,
+    /// The part of `collect_s` after the Worlds have played, in which their parts are joined.
+    pub join_s: f64,
+    /// The part of `learn_s` in which minibatches are assembled.
+    pub gather_s: f64,
+    /// The part of `learn_s` with the products and sums of networks and losses, forward and backward.
+    pub products_s: f64,
+    /// The part of `learn_s` with the steps of the optimiser.
+    pub optimise_s: f64,
+    /// Seconds of all of it in which one thread worked, at most: the others had no World left to play and no loop to
+    /// share.
+    pub alone_s: f64,
+}
+
+impl Timing {
+    /// Returns the seconds of the whole update.
+    pub fn whole_s(&self) -> f64 {
+        self.collect_s + self.learn_s
+    }
+
+    /// Returns its parts by their tags, which add up to the whole, and the share of it in which one thread worked.
+    pub fn scalars(&self) -> [(&'static str, f64); 7] {
+        let Self { collect_s, learn_s, join_s, gather_s, products_s, optimise_s, alone_s } = *self;
+        [
+            ("time/play_s", collect_s - join_s),
+            ("time/join_s", join_s),
+            ("time/gather_s", gather_s),
+            ("time/products_s", products_s),
+            ("time/optimise_s", optimise_s),
+            ("time/rest_s", learn_s - gather_s - products_s - optimise_s),
+            ("time/alone_share", alone_s / self.whole_s()),
+        ]
+    }
 }
 
 /// Returns the natural range of a metric; `None` if any value is possible.
@@ -187,10 +219,14 @@ fn metrics_line(report: &UpdateReport) -> Value {
 
 fn timing_line(report: &UpdateReport, steps_per_update: u64, wall_time: f64) -> Value {
     let timing = report.timing;
-    json!({
+    let mut line = json!({
         "step": report.step, "collect_s": timing.collect_s, "learn_s": timing.learn_s, "wall_time": wall_time,
-        SPS: steps_per_update as f64 / (timing.collect_s + timing.learn_s),
-    })
+        SPS: steps_per_update as f64 / timing.whole_s(),
+    });
+    for (tag, value) in timing.scalars() {
+        line[tag] = json!(value);
+    }
+    line
 }
 
 /// Returns the tags of a line with their values; `null` is NaN. Names without `/` are not metrics.

@@ -16,7 +16,7 @@
 use crate::{
     checkpoint,
     checkpoint::{Checkpoint, CheckpointChoice},
-    collect::{ArenaState, restore_arenas, save_arenas},
+    collect::ArenaState,
     error::{TrainError, edited, unreadable},
     experiment::{
         Algorithm, Experiment,
@@ -231,10 +231,7 @@ impl RunDir {
         let keep = trainer.experiment().checkpoints.keep;
         checkpoint::write(&self.path, trainer.progress.summary(), keep, |fresh| {
             trainer.learner.save(&fresh.learner_file())?;
-            let state = TrainState {
-                progress: trainer.progress.clone(),
-                arenas: trainer.collectors.iter_mut().map(save_arenas).collect(),
-            };
+            let state = TrainState { progress: trainer.progress.clone(), arenas: trainer.save_arenas() };
             Ok(write_sealed(&fresh.arenas_file(), &state)?)
         })
     }
@@ -257,9 +254,7 @@ impl RunDir {
         let continued_schedule = learner.set_length(experiment);
         let mut trainer = Trainer::with_learner(game, experiment, learner, threads)?;
         trainer.report_panics_to(&self.path);
-        for (collector, saved) in trainer.collectors.iter_mut().zip(&state.arenas) {
-            restore_arenas(collector, saved).map_err(TrainError::from)?;
-        }
+        trainer.restore_arenas(&state.arenas).map_err(TrainError::from)?;
         (trainer.progress, trainer.continued_schedule) = (state.progress, continued_schedule);
         trainer.seen = read_sealed::<RunInfo>(&self.path.join("run.json"))?.0.seen;
         checkpoint::set_aside_after(&self.path, trainer.progress.steps)?;

@@ -3,7 +3,7 @@
 
 use crate::{
     checkpoint::CheckpointSummary,
-    collect::Collector,
+    collect::{ArenaState, Collector, RestoreError, restore_arenas, save_arenas},
     error::TrainError,
     experiment::{Algorithm, Experiment, LearnerKind},
     metrics_log::{RECENT, Timing, UpdateReport},
@@ -14,19 +14,19 @@ use bevy_playbot::{
     episode::EpisodeEnded,
     fault::Fault,
     skill_prior::SkillPrior,
-    vision::ObservationConfig,
+    vision::{ObservationConfig, ObservationKind},
 };
 use playbot_harness::{
     game::Game,
     held_out::{HeldOut, seen_by_training},
-    parallel::{on_own_threads, on_threads},
+    parallel::{on_own_threads, on_threads, one_by_one},
     sensors::GameSensors,
     worlds::{Arrangement, is_bound_to_its_thread},
 };
 use playbot_learner::{
     ActionSpace, ContinuedSchedule, DeviceKind, FileError, LearnError, Learner, LearnerMetrics, ObsColumns, ObsKind,
     Observations, Policy, PolicySpec, PpoLearner, Rollout, SacLearner, SeenLevels, SkillModel, SkillSource,
-    SpirlLearner,
+    SpirlLearner, Workers, shared_time,
 };
 use playbot_report::readable;
 use serde::{Deserialize, Serialize};
@@ -34,6 +34,7 @@ use std::{
     collections::VecDeque,
     ops::{Deref, DerefMut, RangeInclusive},
     path::Path,
+    sync::{Mutex, PoisonError},
     time::{Duration, Instant},
 };
 
@@ -44,8 +45,12 @@ const INITIAL_KL_ROWS: usize = 1024;
 pub struct Trainer {
     experiment: Experiment,
     threads: usize,
+    /// Those of them that learn.
+    workers: Workers,
     pub(crate) learner: TrainedLearner,
-    pub(crate) collectors: Vec<Collector>,
+    collectors: Vec<Collector>,
+    /// Agents of each World of the experiment.
+    per_world: usize,
     pub(crate) progress: Progress,
     pub(crate) seen: Option<SeenLevels>,
     pub(crate) continued_schedule: Option<ContinuedSchedule>,
@@ -88,7 +93,7 @@ impl Trainer {
         threads: usize,
     ) -> Result<Self, TrainError> {
         check(game, experiment)?;
-        let learner = TrainedLearner::new(game, experiment, skills, demos, device)?;
+        let learner = Workers::new(threads).bound(|| TrainedLearner::new(game, experiment, skills, demos, device))?;
         let mut seen = seen_by_training(game, &experiment.train);
         if let Some(demos) = skills.filter(|_| experiment.algorithm.needs_skills()).and_then(SkillModel::demos) {
             seen.extend(demos);
@@ -108,8 +113,13 @@ impl Trainer {
         threads: usize,
     ) -> Result<Self, TrainError> {
         let prior = learner.skills().as_ref().map(SkillPrior::from);
-        let arrangement = Arrangement::of_agents(game, experiment.arenas, experiment.worlds);
-        let share = arrangement.arenas;
+        let of_experiment = Arrangement::of_agents(game, experiment.arenas, experiment.worlds);
+        let arrangement = match experiment.observation {
+            // A graphics card draws for few Worlds sooner.
+            ObservationKind::Camera => of_experiment,
+            _ => of_experiment.for_threads(game, threads),
+        };
+        let (share, per_world) = (arrangement.arenas, of_experiment.arenas as usize);
         let (levels, observation_config, seed) = (&experiment.train, experiment.observation_config(), experiment.seed);
         let collectors: Result<_, _> = arrangement
             .first_agents()
@@ -118,22 +128,41 @@ impl Trainer {
         let (experiment, collectors) = (experiment.clone(), collectors?);
         let obs_kind = observation_config.obs_kind(game);
         let (progress, obs) = (Progress::default(), Observations::empty(&obs_kind));
-        let (seen, continued_schedule, raw) = (None, None, Vec::new());
-        Ok(Self { experiment, threads, learner, collectors, progress, seen, continued_schedule, raw, obs_kind, obs })
+        let (seen, continued_schedule, raw, workers) = (None, None, Vec::new(), Workers::new(threads));
+        Ok(Self {
+            experiment,
+            threads,
+            workers,
+            learner,
+            collectors,
+            per_world,
+            progress,
+            seen,
+            continued_schedule,
+            raw,
+            obs_kind,
+            obs,
+        })
     }
 
-    /// Plays one rollout in every arena and learns from it.
+    /// Plays one rollout in every arena and learns from it, on at most as many threads as it was made for. The result
+    /// does not depend on their number.
     ///
     /// # Errors
     ///
     /// [`TrainError`]; the learner stays as it was.
     pub fn update(&mut self) -> Result<UpdateReport, TrainError> {
+        self.workers.clone().bound(|| self.update_here())
+    }
+
+    fn update_here(&mut self) -> Result<UpdateReport, TrainError> {
         let start = Instant::now();
         let (policy, latent) = (self.learner.policy(), self.learner.rollout_latent());
         self.renew_skills();
         let steps = self.experiment.rollout_steps();
-        let (rollout, finished) = self.collect(&policy, latent, steps)?;
-        let collect_s = start.elapsed().as_secs_f64();
+        let before = self.learner.times();
+        let Collected { rollout, finished, played, alone } = self.collect(&policy, latent, steps)?;
+        let (collected, shared) = (start.elapsed(), shared_time());
         if self.progress.updates == 0 {
             let strange = strange_scales(&self.experiment, &self.raw, &rollout);
             strange.iter().for_each(|warning| tracing::warn!("{warning}"));
@@ -144,7 +173,19 @@ impl Trainer {
         self.progress.note(&finished);
         self.progress.updates += 1;
         self.progress.steps += self.experiment.steps_per_update();
-        let timing = Timing { collect_s, learn_s: start.elapsed().as_secs_f64() - collect_s };
+        let times = self.learner.times().since(before);
+        let whole = start.elapsed();
+        // All but the loops of networks runs on one thread, once the Worlds have played.
+        let alone = alone + whole.saturating_sub(played + (shared_time() - shared));
+        let timing = Timing {
+            collect_s: collected.as_secs_f64(),
+            learn_s: (whole - collected).as_secs_f64(),
+            join_s: collected.saturating_sub(played).as_secs_f64(),
+            gather_s: times.gather.as_secs_f64(),
+            products_s: times.products().as_secs_f64(),
+            optimise_s: times.optimise.as_secs_f64(),
+            alone_s: alone.as_secs_f64(),
+        };
         let mut report = self.progress.report(learner, initial_kl, timing);
         report.clipped_share =
             report.clipped_share.filter(|_| matches!(policy.action_space(), ActionSpace::Continuous(_)));
@@ -160,26 +201,35 @@ impl Trainer {
     }
 
     /// Plays `steps` ticks in all Worlds in parallel. Their observations share one buffer, which is reused.
-    fn collect(
-        &mut self,
-        policy: &Policy,
-        latent: usize,
-        steps: usize,
-    ) -> Result<(Rollout, Vec<EpisodeEnded>), TrainError> {
+    fn collect(&mut self, policy: &Policy, latent: usize, steps: usize) -> Result<Collected, TrainError> {
+        let start = Instant::now();
         let mut obs = std::mem::replace(&mut self.obs, Observations::empty(&self.obs_kind));
         let shares: Vec<usize> = self.collectors.iter().map(|collector| collector.agents().len()).collect();
         let columns = obs.columns(&self.obs_kind, steps, &shares);
         let mut work: Vec<_> = self.collectors.iter_mut().zip(columns).collect();
         let is_bound = work.iter().any(|(collector, _)| is_bound_to_its_thread(collector.world()));
+        let (ends, shared) = (Mutex::new(Vec::new()), shared_time());
+        let collect = |(collector, columns): &mut (&mut Collector, ObsColumns<'_>)| {
+            let collected = collector.collect_into(columns, policy, latent, steps);
+            ends.lock().unwrap_or_else(PoisonError::into_inner).push(start.elapsed());
+            collected
+        };
         let collected = if is_bound {
-            on_threads(&mut work, 1, |(collector, columns)| collector.collect_into(columns, policy, latent, steps))
+            one_by_one(&mut work, self.threads, collect)
         } else if work.len() > self.threads || !policy.is_on_host() {
             collect_together(work, self.threads, policy, latent, steps)?
         } else {
             // A World with a core of its own gains nothing from shared passes.
-            on_threads(&mut work, self.threads, |(collector, columns)| {
-                collector.collect_into(columns, policy, latent, steps)
-            })
+            on_threads(&mut work, self.threads, collect)
+        };
+        let played = start.elapsed();
+        let mut ends = ends.into_inner().unwrap_or_else(PoisonError::into_inner);
+        ends.sort_unstable();
+        let alone = match ends.as_slice() {
+            // Worlds that wait for one another end at the same time.
+            [] if self.threads > 1 && self.collectors.len() > 1 => Duration::ZERO,
+            [.., last_but_one, last] if !is_bound && self.threads > 1 => *last - *last_but_one,
+            _ => played.saturating_sub(shared_time() - shared),
         };
         let (mut rollouts, mut finished) = (Vec::new(), Vec::new());
         for part in collected {
@@ -187,7 +237,7 @@ impl Trainer {
             rollouts.push(rollout);
             finished.extend(ended);
         }
-        Ok((Rollout::join_around(obs, rollouts)?, finished))
+        Ok(Collected { rollout: Rollout::join_around(obs, rollouts)?, finished, played, alone })
     }
 
     /// Compares the policy with the decoder before the first update of SCORE: they must be equal to the bit. For a
@@ -244,9 +294,29 @@ impl Trainer {
         self.learner.policy()
     }
 
-    /// Returns the time that the learner has spent on gathering minibatches.
-    pub fn gathering(&self) -> Duration {
-        self.learner.gathering()
+    /// Returns the state of each arena, by the Worlds of the experiment: their number on this machine is not kept.
+    pub(crate) fn save_arenas(&mut self) -> Vec<Vec<ArenaState>> {
+        let all: Vec<ArenaState> = self.collectors.iter_mut().flat_map(save_arenas).collect();
+        all.chunks(self.per_world.max(1)).map(<[_]>::to_vec).collect()
+    }
+
+    /// Brings every arena to its saved state, in a fresh trainer.
+    ///
+    /// # Errors
+    ///
+    /// [`RestoreError`] if the arenas differ in number or do not replay.
+    pub(crate) fn restore_arenas(&mut self, saved: &[Vec<ArenaState>]) -> Result<(), RestoreError> {
+        let (saved, wanted) = (saved.concat(), self.collectors.iter().map(|collector| collector.agents().len()).sum());
+        if saved.len() != wanted {
+            return Err(RestoreError::Count { saved: saved.len(), wanted });
+        }
+        let mut rest = saved.as_slice();
+        for collector in &mut self.collectors {
+            let (own, others) = rest.split_at(collector.agents().len());
+            restore_arenas(collector, own)?;
+            rest = others;
+        }
+        Ok(())
     }
 
     /// Iterates over the Worlds that play, for inspection or measurement.
@@ -274,8 +344,18 @@ impl Trainer {
     }
 }
 
+/// A rollout of all Worlds.
+struct Collected {
+    rollout: Rollout,
+    finished: Vec<EpisodeEnded>,
+    /// Time in which they played.
+    played: Duration,
+    /// The part of it in which one thread played, at most.
+    alone: Duration,
+}
+
 /// Result of a World's play.
-type Collected = Result<(Rollout, Vec<EpisodeEnded>), Fault>;
+type OfWorld = Result<(Rollout, Vec<EpisodeEnded>), Fault>;
 
 /// Plays the Worlds with shared forward passes: the result is the same.
 fn collect_together(
@@ -284,7 +364,7 @@ fn collect_together(
     policy: &Policy,
     latent: usize,
     steps: usize,
-) -> Result<Vec<Collected>, TrainError> {
+) -> Result<Vec<OfWorld>, TrainError> {
     let count = worlds.len();
     let seats = SharedBatch::seats(policy, count, threads);
     let mut work: Vec<_> = worlds.into_iter().zip(seats).collect();

@@ -80,7 +80,7 @@ fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
     let given = Given::new(folder.path());
     for algorithm in Algorithm::ALL.into_iter().filter(|algorithm| algorithm.is_trained()) {
         // Where there are fewer threads than Worlds, these decide together.
-        let results: Vec<_> = [1, 2, 2, 4]
+        let results: Vec<_> = [1, 2, 2, 4, 8]
             .into_iter()
             .enumerate()
             .map(|(index, threads)| {
@@ -92,6 +92,89 @@ fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
         assert!(results[0] == results[1], "{algorithm}: one thread and two threads differ");
         assert!(results[1] == results[2], "{algorithm}: two runs with the same seed differ");
         assert!(results[2] == results[3], "{algorithm}: Worlds that decide alone and together differ");
+        assert!(results[3] == results[4], "{algorithm}: four Worlds and eight, for as many threads, differ");
+    }
+}
+
+/// Returns the names of this process's threads.
+#[cfg(target_os = "linux")]
+fn thread_names() -> Vec<String> {
+    let threads = std::fs::read_dir("/proc/self/task").expect("Linux has it").flatten();
+    // A thread may end meanwhile.
+    let names = threads.filter_map(|thread| std::fs::read_to_string(thread.path().join("comm")).ok());
+    let mut names: Vec<_> = names.map(|name| name.trim().to_owned()).collect();
+    names.sort();
+    names
+}
+
+/// Trains on `threads` threads, and returns the threads that are there now and were not before. Threads that have played
+/// a World are gone.
+#[cfg(target_os = "linux")]
+fn started_by_training(threads: usize) -> Vec<String> {
+    let mut experiment = experiment();
+    experiment.algorithm = Algorithm::Ppo;
+    // Large enough for the passes of a few agents to be shared, if more threads were allowed.
+    experiment.ppo.hidden = vec![1024, 1024];
+    let mut trainer = Trainer::new(&Corridor, &experiment, None, DeviceKind::Flex, threads).expect("fits");
+    let before = thread_names();
+    (0..2).for_each(|_| drop(trainer.update().expect("learns")));
+    let started = || {
+        let mut started = thread_names();
+        for name in &before {
+            started.iter().position(|other| other == name).map(|place| started.remove(place));
+        }
+        started
+    };
+    // The system takes a moment to forget a thread that has ended.
+    (0..1000).find(|_| {
+        started().iter().all(|name| name.starts_with("worker ")) || {
+            std::thread::yield_now();
+            false
+        }
+    });
+    started()
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn learning_takes_no_more_threads_than_are_allowed() {
+    const CHILD: &str = "PLAYBOT_TEST_LEARNING_THREADS";
+    if let Some(path) = std::env::var_os(CHILD) {
+        let path = Path::new(&path);
+        let threads = path.file_name().and_then(|name| name.to_str()?.parse().ok()).expect("a number");
+        return std::fs::write(path, started_by_training(threads).join(", ")).expect("writable");
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    // Other tests have threads, too, so each number has a process of its own.
+    for (threads, expected) in [("1", ""), ("2", "worker 0, worker 1"), ("3", "worker 0, worker 1, worker 2")] {
+        let path = folder.path().join(threads);
+        let child = std::process::Command::new(std::env::current_exe().expect("this test"))
+            .args(["--exact", "training::learning_takes_no_more_threads_than_are_allowed"])
+            .env(CHILD, &path)
+            .output()
+            .expect("starts");
+        assert!(child.status.success(), "{}", String::from_utf8_lossy(&child.stderr));
+        assert_eq!(std::fs::read_to_string(&path).expect("written"), expected, "{threads} threads are allowed");
+    }
+}
+
+#[test]
+fn phases_add_up_to_their_update_and_one_thread_is_alone() {
+    for threads in [1, 2, 4] {
+        let experiment = Experiment { algorithm: Algorithm::Ppo, ..experiment() };
+        let mut trainer = Trainer::new(&Corridor, &experiment, None, DeviceKind::Flex, threads).expect("fits");
+        for _ in 0..2 {
+            let timing = trainer.update().expect("learns").timing;
+            let scalars = timing.scalars();
+            let [phases @ .., (_, alone)] = &scalars;
+            assert!(phases.iter().all(|(_, seconds)| *seconds >= 0.0), "{scalars:?}");
+            let sum: f64 = phases.iter().map(|(_, seconds)| seconds).sum();
+            assert!((sum - timing.whole_s()).abs() < 1e-9 && timing.products_s > 0.0, "{scalars:?}");
+            match threads {
+                1 => assert!((alone - 1.0).abs() < 1e-9, "{alone}"),
+                _ => assert!(*alone > 0.0 && *alone <= 1.0, "{alone}"),
+            }
+        }
     }
 }
 

@@ -18,7 +18,7 @@ use playbot_harness::{
 };
 use playbot_learner::waited;
 use playbot_report::counted;
-use playbot_train::Trainer;
+use playbot_train::{Timing, Trainer};
 use serde_json::{Value, json};
 use std::time::Instant;
 
@@ -26,7 +26,8 @@ use std::time::Instant;
 ///
 /// Numbers hold for this machine and this moment. Nothing is tested. The parts of a step are measured by the clock, for
 /// all threads together. Idle is the share of the threads' time in which this program did not compute: it waited, or
-/// other programs had the cores.
+/// other programs had the cores. The phases of an update follow one another: Worlds play, their parts are joined,
+/// minibatches are gathered, networks compute products, and the optimiser steps.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot bench --list
@@ -43,9 +44,9 @@ pub struct Args {
     /// Arenas.
     #[arg(long, default_value_t = 64)]
     arenas: u32,
-    /// Threads. Each has a World of its own.
+    /// Threads. Each has a World of its own, and all learn together.
     #[arg(long, default_value_t = threads_of_cases())]
-    threads: usize,
+    pub(crate) threads: usize,
     /// Least seconds to measure each case for.
     #[arg(long, default_value_t = 5.0, value_parser = finite_number)]
     seconds: f64,
@@ -168,6 +169,16 @@ struct Measure {
     parts: Value,
     /// Share of the threads' time in which they did nothing. `None` where the system does not report it.
     idle: Option<f64>,
+    /// An update of training.
+    update: Option<Update>,
+}
+
+/// The mean of updates, by the clock.
+struct Update {
+    /// Milliseconds of each phase, one after the other.
+    phases: serde_json::Map<String, Value>,
+    /// Share of an update in which one thread worked, at most.
+    alone: f64,
 }
 
 impl Measure {
@@ -175,6 +186,8 @@ impl Measure {
         json!({
             "case": case, "arenas": args.arenas, "threads": args.threads, "steps_per_s": self.steps_per_s.round(),
             "peak_rss_mib": peak_rss_mib(), "us_per_step": self.parts, "idle_share": self.idle,
+            "ms_per_update": self.update.as_ref().map(|update| &update.phases),
+            "alone_share": self.update.as_ref().map(|update| update.alone),
             "seconds": args.seconds, "device": args.device.device.to_string(), "set": args.set,
             "version": env!("CARGO_PKG_VERSION"),
         })
@@ -183,11 +196,18 @@ impl Measure {
     /// Returns the parts in the order in which they happen.
     fn parts_in_words(&self) -> String {
         let part = |name: &&str| Some(format!("{name} {} µs", self.parts.get(*name)?.as_f64()?));
-        ["simulate", "observe", "infer", "record", "gather", "learn"]
+        let mut parts = ["simulate", "observe", "infer", "record", "gather", "learn"]
             .iter()
             .filter_map(part)
             .collect::<Vec<_>>()
-            .join(", ")
+            .join(", ");
+        if let Some(Update { phases, alone }) = &self.update {
+            let phase = |name: &&str| Some(format!("{name} {} ms", phases.get(*name)?.as_f64()?));
+            let phases: Vec<_> =
+                ["play", "join", "gather", "products", "optimise", "rest"].iter().filter_map(phase).collect();
+            parts += &format!("; in an update {}, {:.1} % on one thread", phases.join(", "), 100.0 * alone);
+        }
+        parts
     }
 }
 
@@ -223,7 +243,7 @@ fn simulate(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, _: 
     let steps = (ticks * u64::from(arrangement.total())) as f64;
     let seconds = start.elapsed().as_secs_f64();
     let idle = idle_share(busy_s() - busy, seconds, args.threads);
-    Ok(Measure { steps_per_s: steps / seconds, parts: stages(worlds.iter_mut(), steps), idle })
+    Ok(Measure { steps_per_s: steps / seconds, parts: stages(worlds.iter_mut(), steps), idle, update: None })
 }
 
 /// Measures PPO with 3 epochs and 8 minibatches. State vectors take 256 steps a rollout, pictures 32 and the
@@ -233,18 +253,32 @@ fn train(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, games:
     let mut trainer = Trainer::new(game, &experiment, None, args.device.device, args.threads)?;
     trainer.update()?;
     trainer.worlds_mut().for_each(|world| world.insert_resource(StageClock::default()));
-    let (start, before, gathered, busy) = (Instant::now(), trainer.steps(), trainer.gathering(), busy_s());
-    let mut learn_s = 0.0;
+    let (start, before, busy) = (Instant::now(), trainer.steps(), busy_s());
+    let mut timings = Vec::new();
     while trainer.steps() == before || start.elapsed().as_secs_f64() < args.seconds {
-        learn_s += trainer.update()?.timing.learn_s;
+        timings.push(trainer.update()?.timing);
     }
     let steps = (trainer.steps() - before) as f64;
     let seconds = start.elapsed().as_secs_f64();
-    let gather_s = (trainer.gathering() - gathered).as_secs_f64();
+    let sum = |of: fn(&Timing) -> f64| timings.iter().map(of).sum::<f64>();
+    let (gather_s, learn_s) = (sum(|timing| timing.gather_s), sum(|timing| timing.learn_s));
     let mut parts = stages(trainer.worlds_mut(), steps);
     parts["gather"] = json!(microseconds(gather_s * args.threads as f64, steps));
     parts["learn"] = json!(microseconds((learn_s - gather_s) * args.threads as f64, steps));
-    Ok(Measure { steps_per_s: steps / seconds, parts, idle: idle_share(busy_s() - busy, seconds, args.threads) })
+    let seconds_of = |(tag, _): (&'static str, f64)| {
+        let of_tag = |timing: &Timing| timing.scalars().into_iter().find(|(of, _)| *of == tag).map_or(0.0, |(_, s)| s);
+        let name = tag.trim_start_matches("time/").trim_end_matches("_s").to_owned();
+        (name, json!(milliseconds(timings.iter().map(of_tag).sum::<f64>() / timings.len() as f64)))
+    };
+    let phases = Timing::default().scalars().into_iter().filter(|(tag, _)| tag.ends_with("_s")).map(seconds_of);
+    let (phases, alone) = (phases.collect(), sum(|timing| timing.alone_s) / sum(Timing::whole_s));
+    let idle = idle_share(busy_s() - busy, seconds, args.threads);
+    Ok(Measure {
+        steps_per_s: steps / seconds,
+        parts,
+        idle,
+        update: Some(Update { phases, alone: thousandths(alone) }),
+    })
 }
 
 /// Returns the experiment of a training case: the settings of the case, overridden by the command line.
@@ -286,6 +320,14 @@ fn microseconds(seconds: f64, steps: f64) -> f64 {
     (1e8 * seconds / steps).round() / 100.0
 }
 
+fn milliseconds(seconds: f64) -> f64 {
+    (1e5 * seconds).round() / 100.0
+}
+
+fn thousandths(share: f64) -> f64 {
+    (1000.0 * share).round() / 1000.0
+}
+
 /// Returns the largest resident memory of this process so far, MiB; 0 where the system does not report it.
 fn peak_rss_mib() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -308,5 +350,5 @@ fn busy_s() -> f64 {
 
 fn idle_share(busy_s: f64, seconds: f64, threads: usize) -> Option<f64> {
     let share = 1.0 - busy_s / (seconds * threads as f64);
-    (busy_s > 0.0).then_some((1000.0 * share.max(0.0)).round() / 1000.0)
+    (busy_s > 0.0).then_some(thousandths(share.max(0.0)))
 }

@@ -88,7 +88,7 @@ pub struct Args {
     #[arg(long)]
     seed: Option<u64>,
     #[command(flatten)]
-    compute: Compute,
+    pub(crate) compute: Compute,
     /// Also draw the players' paths, and how often they were at each position, into this .png or .svg.
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,

@@ -99,7 +99,7 @@ pub struct Args {
     #[arg(long, default_value_t = 0)]
     seed: u64,
     #[command(flatten)]
-    compute: Compute,
+    pub(crate) compute: Compute,
     /// Record the shortest solution, or the path to --cell, into this .demo, once it has been replayed.
     #[arg(long, value_name = "FILE", value_parser = output::demo)]
     out: Option<PathBuf>,

@@ -20,7 +20,6 @@ use std::path::{Path, PathBuf};
 
 /// Learn the skill model (encoder, decoder, prior) from recordings.
 #[derive(clap::Args)]
-#[command(mut_arg("threads", |threads| threads.help("Threads that replay recordings. The result does not depend on their number")))]
 #[command(after_help = "Examples:
   playbot learn-skills GAME --out skills.safetensors
   playbot learn-skills --set observation=Raster --max-steps 30000 --out pixels.safetensors
@@ -49,7 +48,7 @@ pub struct Args {
     #[arg(long)]
     resume: bool,
     #[command(flatten)]
-    compute: Compute,
+    pub(crate) compute: Compute,
     /// Print the metrics of each epoch as a line of JSON.
     #[arg(long)]
     json: bool,

@@ -82,7 +82,7 @@ pub struct Args {
     #[arg(long)]
     epochs: Option<usize>,
     #[command(flatten)]
-    threads: Threads,
+    pub(crate) threads: Threads,
     /// Measure held-out levels of a layout that was trained on or recorded with the others, instead of leaving them out.
     #[arg(long)]
     include_seen: bool,

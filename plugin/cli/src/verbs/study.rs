@@ -78,7 +78,7 @@ pub struct Args {
     )]
     rewrite: bool,
     #[command(flatten)]
-    compute: Compute,
+    pub(crate) compute: Compute,
     /// One line of JSON per run instead of the table.
     #[arg(long)]
     json: bool,

@@ -99,7 +99,7 @@ pub struct Args {
     #[command(flatten)]
     regress: RegressArgs,
     #[command(flatten)]
-    compute: Compute,
+    pub(crate) compute: Compute,
     /// Print one line of JSON per level instead of a table.
     #[arg(long)]
     json: bool,

@@ -72,7 +72,7 @@ pub struct Args {
     #[arg(long)]
     seed: Option<u64>,
     #[command(flatten)]
-    compute: Compute,
+    pub(crate) compute: Compute,
     /// Save a checkpoint every this many updates, instead of the experiment's.
     #[arg(long)]
     checkpoint_every: Option<u64>,

@@ -350,6 +350,13 @@ mod tests {
         assert_eq!(Arrangement::of_agents(&game, 8, 2), Arrangement { worlds: 4, arenas: 2 });
         assert_eq!(Arrangement::of_agents(&game, 3, 1), Arrangement { worlds: 2, arenas: 2 }, "rounded up");
         assert_eq!(Arrangement::new(&game, 8, 2), Arrangement { worlds: 8, arenas: 1 });
+        let together = Arrangement { worlds: 4, arenas: 2 };
+        assert_eq!(together.for_threads(&game, 16), together);
+        let alone = ForeignGame::new("alone", 1, |_: &mut App| {}).keys([vec![]]).observe(["x"], || [0.0]);
+        let split = |threads| Arrangement { worlds: 2, arenas: 32 }.for_threads(&alone, threads);
+        for (threads, worlds) in [(1, 2), (3, 2), (4, 4), (7, 4), (16, 16), (63, 32), (1000, 64)] {
+            assert_eq!(split(threads), Arrangement { worlds, arenas: 64 / worlds }, "{threads} threads");
+        }
     }
 
     #[test]

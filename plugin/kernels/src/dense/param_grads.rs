@@ -6,8 +6,8 @@ use crate::{
     tile::{LANES, Lanes, WIDE_ROWS, Window, column_sums, outer},
 };
 
-/// Rows of weights that a thread takes at a time.
-const PART: usize = 32;
+/// Rows of weights that a thread takes at a time: few enough for many threads in a layer of 200.
+const PART: usize = 16;
 
 /// The inputs of the gradients of a layer's parameters.
 #[derive(Clone, Copy, Debug)]

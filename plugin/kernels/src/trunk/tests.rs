@@ -1,6 +1,7 @@
 //! Tests of the trunk against burn's own operations, finite differences, other batches and other numbers of threads.
 
 use crate::{
+    among_workers::{Workers, among_awake_workers},
     elementwise::{Activation, Write},
     trunk::{grid::ConvShape, winograd::PointBuffers, *},
 };
@@ -198,10 +199,8 @@ fn gradients_are_slopes() {
 fn an_image_is_the_same_in_any_batch_and_on_any_number_of_threads() {
     for (parts, side) in [(&NATURE[..], 40), (&SMALL[..], 20), (&[Part::Pool(16), Part::Residual], 24)] {
         let (net, pixels) = (Net::new(parts, 3), images([41, 3, side, side]));
-        let on = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-            pool.install(|| net.results(net.trunk(&pixels)))
-        };
+        let on =
+            |threads: usize| Workers::new(threads).bound(|| among_awake_workers(|| net.results(net.trunk(&pixels))));
         let whole = on(1);
         assert!(on(3) == whole, "{parts:?}: threads change bits");
         let width = whole[0].len() / 41;

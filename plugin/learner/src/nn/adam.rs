@@ -9,21 +9,22 @@ use crate::{
 };
 use burn::tensor::{Device, Gradients, Tensor, TensorData};
 use playbot_kernels::{
-    among_workers::are_awake,
     instructions::macerator::{self, Simd},
+    kept_memory::share_each,
 };
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::{borrow::Cow, collections::BTreeMap, iter::Peekable};
+use std::{
+    borrow::Cow,
+    collections::BTreeMap,
+    iter::Peekable,
+    time::{Duration, Instant},
+};
 
 /// Numbers that one thread updates at a time.
-const CHUNK: usize = 1 << 14;
+const CHUNK: usize = 1 << 13;
 
-/// Numbers up to which a second thread costs more than it saves.
-const FEW: usize = 1 << 16;
-
-/// The same where other threads are awake.
-const FEW_AWAKE: usize = 1 << 15;
+/// Number of products that take as long as the update of a number, which waits for memory.
+const OF_A_NUMBER: usize = 16;
 
 /// Numbers that are updated side by side.
 const LANES: usize = 16;
@@ -58,17 +59,24 @@ pub struct Adam {
     pub(crate) moments: BTreeMap<String, Moments>,
     /// The moments, in place of those above, if they are on a graphics card.
     pub(super) flat: Option<FlatMoments>,
+    /// Time spent on steps. It is not saved.
+    spent: Duration,
 }
 
 impl Adam {
     /// Creates an optimizer without any state.
     pub fn new(config: AdamConfig) -> Self {
-        Self { config, steps: 0, moments: BTreeMap::new(), flat: None }
+        Self { config, steps: 0, moments: BTreeMap::new(), flat: None, spent: Duration::ZERO }
     }
 
     /// Returns the number of steps done.
     pub fn steps(&self) -> u64 {
         self.steps
+    }
+
+    /// Returns the time spent on steps since it was made.
+    pub fn spent(&self) -> Duration {
+        self.spent
     }
 
     /// Returns the first and second moment of the parameter called `name`, if it was ever updated.
@@ -108,6 +116,7 @@ impl Adam {
         lr: f64,
         scale: f64,
     ) -> Result<(), LearnError> {
+        let start = Instant::now();
         self.steps += 1;
         let t = self.steps.min(i32::MAX as u64) as i32;
         let mut visitor = Step {
@@ -121,7 +130,9 @@ impl Adam {
         if let Some(error) = visitor.error {
             return Err(error);
         }
-        match visitor.grads.next() {
+        let superfluous = visitor.grads.next();
+        self.spent += start.elapsed();
+        match superfluous {
             None => Ok(()),
             Some((name, _)) => {
                 Err(LearnError::Config(format!("the gradient of `{name}` belongs to no parameter here")))
@@ -169,16 +180,12 @@ impl<I: Iterator> Step<'_, I> {
             self.moments.insert(name.to_owned(), fresh);
         }
         let moments = self.moments.get_mut(name).expect("inserted above if it was missing");
-        let formula = &self.formula;
-        let few = if are_awake() { FEW_AWAKE } else { FEW };
-        let is_finite = if weights.len() <= few {
-            formula.apply(weights, grad, &mut moments.m, &mut moments.v)
-        } else {
-            let rows = weights.par_chunks_mut(CHUNK).zip(grad.par_chunks(CHUNK));
-            let moments = moments.m.par_chunks_mut(CHUNK).zip(moments.v.par_chunks_mut(CHUNK));
-            let finite = rows.zip(moments).map(|((w, g), (m, v))| formula.apply(w, g, m, v));
-            finite.reduce(|| true, |a, b| a && b)
-        };
+        let (formula, products) = (&self.formula, weights.len() * OF_A_NUMBER);
+        let rows = weights.chunks_mut(CHUNK).zip(grad.chunks(CHUNK));
+        let moments = moments.m.chunks_mut(CHUNK).zip(moments.v.chunks_mut(CHUNK));
+        let mut pieces: Vec<_> = rows.zip(moments).map(|(rows, moments)| (rows, moments, true)).collect();
+        share_each(&mut pieces, products, |_, ((w, g), (m, v), is_finite)| *is_finite = formula.apply(w, g, m, v));
+        let is_finite = pieces.iter().all(|(_, _, is_finite)| *is_finite);
         is_finite
             .then_some(())
             .ok_or_else(|| LearnError::NotFinite { tensor: name.to_owned(), steps: Some(self.steps) })
@@ -275,6 +282,7 @@ impl Adam {
         lr: f64,
         max_norm: f64,
     ) -> Tensor<1> {
+        let start = Instant::now();
         let mut read = Flatten { grads: &mut grads, parts: Vec::new(), layout: Vec::new() };
         network.visit("", &mut read);
         let Flatten { parts, layout, .. } = read;
@@ -296,6 +304,7 @@ impl Adam {
         let decay = 1.0 - lr * self.config.weight_decay;
         network.visit("", &mut Apply { change, at: 0, decay });
         self.flat = Some(FlatMoments { m, v, layout });
+        self.spent += start.elapsed();
         norm
     }
 }

@@ -12,9 +12,12 @@ use burn::tensor::{
     module::{conv2d, max_pool2d},
     ops::{ConvOptions, MaxPoolOptions},
 };
-use playbot_kernels::{host_numbers::is_host, trunk::Conv};
+use playbot_kernels::{
+    host_numbers::is_host,
+    kept_memory::{OF_A_MOVE, share},
+    trunk::Conv,
+};
 use rand::Rng;
-use rayon::prelude::*;
 
 /// A two-dimensional convolution (cross-correlation) with a square kernel.
 #[derive(Clone, Debug)]
@@ -188,9 +191,10 @@ impl ObsBatch {
             return PackedPixels::send(&bytes, sides, device).numbers();
         }
         let mut numbers = vec![0.0f32; rows.len() * size];
-        numbers.par_chunks_mut(size.max(1)).zip(rows).for_each(|(image, &row)| {
-            let bytes = &pixels[row * size..(row + 1) * size];
-            image.iter_mut().zip(bytes).for_each(|(x, &byte)| *x = f32::from(byte) / 255.0);
+        let moves = numbers.len() * OF_A_MOVE;
+        share(&mut numbers, size.max(1), moves, |image, numbers| {
+            let bytes = &pixels[rows[image] * size..][..size];
+            numbers.iter_mut().zip(bytes).for_each(|(x, &byte)| *x = f32::from(byte) / 255.0);
         });
         Tensor::from_data(TensorData::new(numbers, [rows.len(), channels, height, width]), device)
     }

@@ -5,11 +5,13 @@ use crate::{
     nn::params::{ParamVisitor, Parameters},
 };
 use burn::tensor::{Gradients, Tensor, TensorData};
-use playbot_kernels::KeptMemory;
-use rayon::prelude::*;
+use playbot_kernels::{
+    KeptMemory,
+    kept_memory::{OF_A_MOVE, share, share_each},
+};
 
-/// Size up to which a second thread costs more than it saves.
-const FEW: usize = 1 << 17;
+/// Numbers whose squares are summed at a time, and added to those of another part of the batch.
+const BLOCK: usize = 1 << 16;
 
 /// The gradients of a network's parameters on the host, in the order of [`Parameters::visit`].
 #[derive(Clone, Debug, Default)]
@@ -57,7 +59,10 @@ impl NamedGrads {
         }
         for ((_, to), (_, from)) in self.entries.iter_mut().zip(&more.entries) {
             let to = to.as_mut_slice::<f32>().expect("gradients are checked to be f32 when they are read");
-            to.iter_mut().zip(numbers(from)).for_each(|(to, from)| *to += from);
+            let (from, moves) = (numbers(from), to.len() * OF_A_MOVE);
+            share(to, BLOCK, moves, |block, to| {
+                to.iter_mut().zip(&from[block * BLOCK..]).for_each(|(to, from)| *to += from);
+            });
         }
     }
 
@@ -73,15 +78,12 @@ impl NamedGrads {
 
     /// Returns the Euclidean norm over all gradients together.
     pub fn norm(&self) -> f64 {
-        let sum_of = |(_, values): &(String, TensorData)| square_sum(numbers(values));
         let all: usize = self.entries.iter().map(|(_, values)| values.num_elements()).sum();
         // Each sum is made by one thread, and the sums are added in order.
-        let sums: Vec<f64> = if all <= FEW {
-            self.entries.iter().map(sum_of).collect()
-        } else {
-            self.entries.par_iter().map(sum_of).collect()
-        };
-        sums.iter().sum::<f64>().sqrt()
+        let blocks = self.entries.iter().flat_map(|(_, values)| numbers(values).chunks(BLOCK));
+        let mut sums: Vec<(&[f32], f64)> = blocks.map(|block| (block, 0.0)).collect();
+        share_each(&mut sums, all * OF_A_MOVE, |_, (block, sum)| *sum = square_sum(block));
+        sums.iter().map(|(_, sum)| sum).sum::<f64>().sqrt()
     }
 
     /// Returns the factor that scales a total norm down to `max_norm`: min(1, max_norm / (norm + 1e-6)).

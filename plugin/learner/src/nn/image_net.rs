@@ -11,7 +11,6 @@ use crate::{
 };
 use burn::tensor::{Device, Tensor};
 use playbot_kernels::{
-    among_workers::among_workers,
     elementwise::Activation,
     trunk,
     trunk::{TrunkStage, grid::window_places},
@@ -159,10 +158,10 @@ impl ImageNet {
     /// Maps pixels in 0..1, `[n, channels, height, width]`, to features `[n, features]`. Gradients reach the
     /// parameters, not the pixels.
     pub fn forward(&self, pixels: Tensor<4>) -> Tensor<2> {
-        among_workers(|| match self {
+        match self {
             Self::Impala(net) => net.forward(pixels),
             Self::Nature(net) => net.forward(pixels),
-        })
+        }
     }
 
     /// Returns the number of 64×64 images per batch of learning: the activations kept for their gradient stay below a

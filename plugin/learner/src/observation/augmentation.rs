@@ -5,9 +5,9 @@ use crate::{
     observation::{ImageShape, ObsKind},
     rng::unit,
 };
+use playbot_kernels::kept_memory::{OF_A_MOVE, share};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// A random change of an image. All pictures of a stack are changed alike.
@@ -73,10 +73,11 @@ pub(crate) fn augmented(
     let size = shape.numbers();
     let seeds: Vec<u64> = rows.iter().map(|_| rng.next_u64()).collect();
     let mut changed = vec![0; rows.len() * size];
-    changed.par_chunks_mut(size.max(1)).zip(rows).zip(seeds).for_each(|((image, &row), seed)| {
-        let original = &pixels[row * size..(row + 1) * size];
+    let moves = changed.len() * augmentations.len() * OF_A_MOVE;
+    share(&mut changed, size.max(1), moves, |number, image| {
+        let original = &pixels[rows[number] * size..][..size];
         image.copy_from_slice(original);
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut rng = ChaCha8Rng::seed_from_u64(seeds[number]);
         augmentations.iter().for_each(|augmentation| augmentation.apply(image, original, shape, &mut rng));
     });
     changed

@@ -7,11 +7,28 @@ use crate::{
     score::{ConfidenceKind, KlDirection, PenaltyForm, ScoreConfig},
 };
 use burn::tensor::Tensor;
+use playbot_kernels::kept_memory::share;
 use rand::Rng;
-use rayon::prelude::*;
 
 /// Rows that a thread takes at a time.
 const ROWS: usize = 1024;
+
+/// Number of products that take as long as a number of a row.
+const OF_A_NUMBER: usize = 64;
+
+/// Returns a value for each of `n` rows of `dim` numbers.
+fn by_row<T: Copy + Default + Send>(n: usize, dim: usize, of_row: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    let mut all = vec![T::default(); n];
+    share(&mut all, ROWS, n * dim * OF_A_NUMBER, |piece, values| {
+        (piece * ROWS..).zip(values).for_each(|(row, value)| *value = of_row(row));
+    });
+    all
+}
+
+/// Returns a row of `dim` numbers.
+fn row_of(all: &[f32], dim: usize, row: usize) -> &[f32] {
+    &all[row * dim..][..dim]
+}
 
 /// Returns the divergence of each row in the configured direction, in nats, `[n]`. Exactly 0 where the two are equal.
 /// `decoder` is constant.
@@ -55,8 +72,8 @@ pub fn own_samples<R: Rng + ?Sized>(decoder: &HostDist, rng: &mut R) -> Actions 
     match &decoder.log_std {
         None => {
             let draws: Vec<f64> = rows.map(|_| unit(rng)).collect();
-            let rows = decoder.head.par_chunks_exact(decoder.dim).zip(draws).with_min_len(ROWS);
-            Actions::Discrete(rows.map(|(logits, draw)| categorical_at(logits, draw)).collect())
+            let of_row = |row: usize| categorical_at(row_of(&decoder.head, decoder.dim, row), draws[row]);
+            Actions::Discrete(by_row(draws.len(), decoder.dim, of_row))
         }
         Some(stds) => {
             let stds = stds.chunks_exact(decoder.dim);
@@ -99,33 +116,30 @@ pub fn penalty_weights<R: Rng + ?Sized>(
 /// [`LearnError::Action`] or [`LearnError::Shape`] if the actions do not fit the decoder.
 pub fn confidences(kind: ConfidenceKind, decoder: &HostDist, actions: &Actions) -> Result<Vec<f32>, LearnError> {
     let (dim, kind) = (decoder.dim, kind.resolved(decoder.log_std.is_some()));
-    let rows = decoder.head.par_chunks_exact(dim);
+    let n = decoder.head.len() / dim;
     if kind == ConfidenceKind::Off {
-        return Ok(vec![1.0; rows.len()]);
+        return Ok(vec![1.0; n]);
     }
-    LearnError::check("actions", rows.len(), actions.len())?;
+    LearnError::check("actions", n, actions.len())?;
     match (&decoder.log_std, actions) {
         (None, Actions::Discrete(actions)) => {
             if actions.iter().any(|&a| a as usize >= dim) {
                 return Err(LearnError::Action(format!("one is not below {dim}")));
             }
-            let log_prob = |(logits, &a): (&[f32], &u32)| match kind {
+            let log_prob = |logits: &[f32], a: u32| match kind {
                 ConfidenceKind::BoundedDensity => logits[a as usize] - logits[argmax(logits) as usize],
                 _ => categorical_log_prob(logits, a),
             };
-            Ok(rows.zip(actions).with_min_len(ROWS).map(|row| libm::expf(log_prob(row))).collect())
+            Ok(by_row(n, dim, |row| libm::expf(log_prob(row_of(&decoder.head, dim, row), actions[row]))))
         }
-        (Some(stds), Actions::Continuous { dim: width, values }) if *width == dim => {
-            let rows = rows.zip(stds.par_chunks_exact(dim)).zip(values.par_chunks_exact(dim));
-            Ok(rows
-                .with_min_len(ROWS)
-                .map(|((mean, log_std), action)| match kind {
-                    ConfidenceKind::Density => libm::expf(gaussian_log_prob(mean, log_std, action)),
-                    ConfidenceKind::BoundedDensity => libm::exp(-0.5 * square_sum(mean, log_std, action)) as f32,
-                    _ => libm::exp(-0.5 * square_sum(mean, log_std, action) / dim as f64) as f32,
-                })
-                .collect())
-        }
+        (Some(stds), Actions::Continuous { dim: width, values }) if *width == dim => Ok(by_row(n, dim, |row| {
+            let [mean, log_std, action] = [&decoder.head, stds, values].map(|all| row_of(all, dim, row));
+            match kind {
+                ConfidenceKind::Density => libm::expf(gaussian_log_prob(mean, log_std, action)),
+                ConfidenceKind::BoundedDensity => libm::exp(-0.5 * square_sum(mean, log_std, action)) as f32,
+                _ => libm::exp(-0.5 * square_sum(mean, log_std, action) / dim as f64) as f32,
+            }
+        })),
         _ => Err(LearnError::Action("decoder and actions differ in kind".to_owned())),
     }
 }

@@ -5,7 +5,7 @@ use crate::{
     norm::ObsStats,
     rng::{Streams, below, fnv1a, shuffle},
 };
-use rayon::prelude::*;
+use playbot_kernels::kept_memory::{OF_A_MOVE, share};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -159,21 +159,20 @@ impl Dataset {
 
     /// Returns a hash of all observations, actions, states and masks, the same on any number of threads.
     pub(super) fn fingerprint(&self) -> u64 {
-        let mut hashes: Vec<[u64; 2]> = self
-            .episodes
-            .par_iter()
-            .map(|episode| {
-                let observations = match &episode.observations {
-                    Observations::Vector(values) => fnv1a(bytemuck::cast_slice(values)),
-                    Observations::Image(pixels) => fnv1a(pixels),
-                };
-                let actions = match &episode.actions {
-                    Actions::Discrete(choices) => fnv1a(bytemuck::cast_slice(choices)),
-                    Actions::Continuous { values, .. } => fnv1a(bytemuck::cast_slice(values)),
-                };
-                [observations, actions]
-            })
-            .collect();
+        let mut hashes = vec![[0; 2]; self.episodes.len()];
+        let numbers = self.steps() * self.observation.numbers();
+        share(&mut hashes, 1, numbers * OF_A_MOVE, |number, hashes| {
+            let episode = &self.episodes[number];
+            let observations = match &episode.observations {
+                Observations::Vector(values) => fnv1a(bytemuck::cast_slice(values)),
+                Observations::Image(pixels) => fnv1a(pixels),
+            };
+            let actions = match &episode.actions {
+                Actions::Discrete(choices) => fnv1a(bytemuck::cast_slice(choices)),
+                Actions::Continuous { values, .. } => fnv1a(bytemuck::cast_slice(values)),
+            };
+            hashes[0] = [observations, actions];
+        });
         hashes.extend(self.states.as_ref().map(|states| [states.fingerprint(), 0]));
         hashes.extend(self.legal.iter().map(|mask| [fnv1a(bytemuck::cast_slice(mask)), 0]));
         fnv1a(bytemuck::cast_slice(&hashes))

@@ -8,6 +8,7 @@ use crate::{
     policy::{Actor, InputBuilder},
 };
 use burn::tensor::Device;
+use playbot_kernels::kept_memory::KeptWeights;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -36,6 +37,7 @@ pub(crate) struct PriorNet {
     observation: ObsKind,
     pub(crate) stats: Option<Arc<ObsStats>>,
     device: Device,
+    kept: KeptWeights,
 }
 
 impl Prior {
@@ -49,7 +51,8 @@ impl Prior {
         tanh: bool,
         device: Device,
     ) -> Self {
-        Self { net: Some(PriorNet { actor: frozen(actor), observation, stats, device }), latent, tanh }
+        let kept = KeptWeights::default();
+        Self { net: Some(PriorNet { actor: frozen(actor), observation, stats, device, kept }), latent, tanh }
     }
 
     /// Creates a prior that ignores the state: standard normal, then tanh if `tanh`.
@@ -89,18 +92,19 @@ impl Prior {
         let numbers = n * self.latent;
         let (mut z, log_std) = match &self.net {
             None => (vec![0.0; numbers], vec![0.0; numbers]),
-            Some(PriorNet { actor, observation: kind, stats, device }) => {
+            Some(PriorNet { actor, observation: kind, stats, device, kept }) => {
                 let obs = obs.into();
                 obs.check("observations of the prior", kind, n)?;
                 let inputs = InputBuilder { z: &[], latent: 0, obs, kind, stats: stats.as_deref() };
-                let dist = guarded(device, || {
+                let pass = || {
                     let mut x = actor.join(&inputs.input(&(0..n).collect::<Vec<_>>(), device))?;
                     if n == 1 {
                         // As in `Policy`: a single row would be summed in another order.
                         x = x.repeat_dim(0, 2);
                     }
                     actor.forward(x).to_host()
-                })?;
+                };
+                let dist = kept.during(|| guarded(device, pass))?;
                 (dist.head, dist.log_std.unwrap_or_default())
             }
         };

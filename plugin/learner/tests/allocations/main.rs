@@ -6,18 +6,16 @@ use std::sync::{Mutex, PoisonError};
 use allocation_counter::{AllocationInfo, measure};
 use burn::tensor::{Tensor, TensorData};
 use playbot_learner::{
-    DeviceKind, ImageShape,
+    DeviceKind, ImageShape, Workers,
     nn::{Activation, Adam, AdamConfig, CnnKind, ImageNet, Mlp, NamedGrads, ObsBatch, Parameters, tracked},
     rng::{ChaCha8Rng, Streams, below, normal},
 };
-use rayon::ThreadPoolBuilder;
 
 /// Returns the allocations of the third step, on one thread.
-fn of_a_step(mut step: impl FnMut() + Send) -> AllocationInfo {
+fn of_a_step(mut step: impl FnMut()) -> AllocationInfo {
     static TURN: Mutex<()> = Mutex::new(());
     let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-    let pool = ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
-    pool.install(|| {
+    Workers::new(1).bound(|| {
         (0..2).for_each(|_| step());
         measure(step)
     })

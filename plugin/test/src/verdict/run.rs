@@ -20,6 +20,7 @@ use bevy_playbot::{
     fault::Fault,
 };
 use playbot_harness::{eval::EvalError, game::Game, worlds::check_start};
+use playbot_learner::Workers;
 use std::{
     collections::{BTreeMap, BTreeSet},
     sync::{Mutex, MutexGuard, PoisonError},
@@ -117,12 +118,15 @@ pub fn run_tests_keeping(
     let shared = Shared { next: 0, open: BTreeMap::new(), keep, failure: None, is_stopped: false };
     let shared = Mutex::new(shared);
     let threads = plan.threads.clamp(1, (portions.len() * plan.testers.len()).max(1));
+    // Networks take no other threads.
+    let workers = || Workers::new(plan.threads / threads);
+    let run = || workers().bound(|| work(game, plan, &portions, &shared, watch, files));
     thread::scope(|scope| {
         for _ in 1..threads {
             // If the system starts fewer threads, the test takes longer.
-            let _ = Builder::new().spawn_scoped(scope, || work(game, plan, &portions, &shared, watch, files));
+            let _ = Builder::new().spawn_scoped(scope, run);
         }
-        work(game, plan, &portions, &shared, watch, files);
+        run();
     });
     let Shared { failure, is_stopped, .. } = shared.into_inner().unwrap_or_else(PoisonError::into_inner);
     match failure {
