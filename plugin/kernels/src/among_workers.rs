@@ -129,7 +129,7 @@ impl Drop for Flag {
 }
 
 /// Returns the number of threads that a loop begun here may take.
-fn threads() -> usize {
+pub(crate) fn threads() -> usize {
     match WORKERS.with_borrow(Clone::clone) {
         Some(workers) => workers.pool().map_or(1, ThreadPool::current_num_threads),
         None => rayon::current_num_threads(),

@@ -1,13 +1,20 @@
 //! Gradients of weights and biases: sums over all rows.
 
 use crate::{
+    among_workers::threads,
     elementwise::{Activation, Store, Write, relu_backward, vectorized},
     kept_memory::{KeptMemory, share_each},
-    tile::{LANES, Lanes, WIDE_ROWS, Window, column_sums, outer},
+    tile::{BLOCK, LANES, Lanes, WIDE_ROWS, Window, column_sums, outer},
 };
 
-/// Rows of weights that a thread takes at a time: few enough for many threads in a layer of 200.
-const PART: usize = 16;
+/// Smallest and largest number of rows of weights that a thread takes at a time. Many are less work together: they share
+/// what is read of the gradients. Few are there for all threads in a layer of 200.
+const PART: [usize; 2] = [16, 48];
+
+/// Returns the number of rows of weights that a thread takes at a time, of so many.
+fn part(inputs: usize) -> usize {
+    (inputs / (2 * threads())).next_multiple_of(WIDE_ROWS).clamp(PART[0], PART[1])
+}
 
 /// The inputs of the gradients of a layer's parameters.
 #[derive(Clone, Copy, Debug)]
@@ -33,34 +40,25 @@ pub(crate) fn param_grads(layers: &[LayerSums<'_>]) -> Vec<ParamGrads> {
         bias: vec![0.0; sums.columns],
     });
     let mut found: Vec<ParamGrads> = empty.collect();
-    let places: Vec<Places> = layers.iter().map(Places::new).collect();
+    let places =
+        |layer: &LayerSums<'_>| (0..layer.x.len() / layer.inputs).map(|row| row * layer.sums.stride()).collect();
+    let places: Vec<Vec<usize>> = layers.iter().map(places).collect();
     let parts = found.iter_mut().zip(layers).zip(&places).flat_map(|((found, layer), places)| {
         let mut bias = Some(&mut *found.bias);
-        let weights = found.weights.chunks_mut(PART * layer.sums.columns).enumerate();
-        weights.map(move |(part, weights)| Part { layer, places, first: part * PART, weights, bias: bias.take() })
+        let rows = part(layer.inputs);
+        let weights = found.weights.chunks_mut(rows * layer.sums.columns).enumerate();
+        weights.map(move |(part, weights)| Part { layer, places, first: part * rows, weights, bias: bias.take() })
     });
     let products = |layer: &LayerSums<'_>| layer.x.len() * layer.sums.columns;
     share_each(&mut parts.collect::<Vec<_>>(), layers.iter().map(products).sum(), |_, part| part.sum());
     found
 }
 
-/// Positions at which rows begin.
-struct Places {
-    x: Vec<usize>,
-    sums: Vec<usize>,
-}
-
-impl Places {
-    fn new(layer: &LayerSums<'_>) -> Self {
-        let every = |width: usize| (0..layer.x.len() / layer.inputs).map(|row| row * width).collect();
-        Self { x: every(layer.inputs), sums: every(layer.sums.stride()) }
-    }
-}
-
 /// Some rows of weights.
 struct Part<'a> {
     layer: &'a LayerSums<'a>,
-    places: &'a Places,
+    /// Positions at which the rows of the gradients begin.
+    places: &'a [usize],
     /// The first of them.
     first: usize,
     weights: &'a mut [f32],
@@ -83,7 +81,7 @@ impl Part<'_> {
         }
         if let Some(bias) = &mut self.bias {
             let mut sums = vec![[0.0; LANES]; columns.div_ceil(LANES)];
-            column_sums(y, &self.places.sums, &mut sums);
+            column_sums(y, self.places, &mut sums);
             bias.copy_from_slice(&sums.as_flattened()[..columns]);
         }
     }
@@ -91,16 +89,17 @@ impl Part<'_> {
     /// Adds the products of inputs and gradients.
     fn add_products(&self, y: &[f32], rows: usize, sums: &mut [Lanes]) {
         let LayerSums { x, inputs, .. } = *self.layer;
-        let Places { x: starts, sums: places } = self.places;
         let window = Window { count: 1, step: 0, len: rows };
-        // A few numbers beyond a row are read and not used. The last rows may have none behind them.
-        let beyond = (self.first + rows + WIDE_ROWS).saturating_sub(inputs);
-        let (safe, last) = places.split_at(places.len() - beyond.div_ceil(inputs).min(places.len()));
-        outer(&x[self.first..], &starts[..safe.len()], window, y, safe, sums);
-        if !last.is_empty() {
-            let mut end = x[safe.len() * inputs + self.first..].to_vec();
-            end.resize(end.len() + rows + WIDE_ROWS, 0.0);
-            outer(&end, &starts[..last.len()], window, y, last, sums);
+        // Rows of wide layers would share few lines of the cache, so they are copied, with an odd number of lines for each. A
+        // few numbers beyond a row are read and not used.
+        let stride = ((rows + WIDE_ROWS).div_ceil(LANES) | 1) * LANES;
+        let starts: Vec<usize> = (0..BLOCK).map(|row| row * stride).collect();
+        let mut seen = KeptMemory::zeros(BLOCK * stride);
+        for (x, places) in x.chunks(BLOCK * inputs).zip(self.places.chunks(BLOCK)) {
+            for (to, x) in seen.chunks_exact_mut(stride).zip(x.chunks_exact(inputs)) {
+                to[..rows].copy_from_slice(&x[self.first..][..rows]);
+            }
+            outer(&seen, &starts[..places.len()], window, y, places, sums);
         }
     }
 }

@@ -4,8 +4,8 @@
 //! vectors.
 
 use crate::{
-    instructions::macerator::{self, Simd},
-    tile::{LANES, Lanes, fused, is_wide, lanes_at},
+    instructions::macerator::{self, Simd, Vector},
+    tile::{LANES, Lanes, Part, is_wide, parts, row_of, write_row},
 };
 
 /// Number of rows at a time where a vector has all lanes: with two blocks of channels the sums take 16 of 32
@@ -36,17 +36,18 @@ pub(super) fn products<S: Simd>(v: &[f32], from: Matrices, weights: &[Lanes], m:
             let v = &v[..from.rows * from.columns];
             let mut block = 0;
             if is_wide::<S>() {
-                for pair in weights.chunks_exact(2 * from.columns) {
-                    let (one, other) = pair.split_at(from.columns);
-                    product_of_pair::<S, WIDE_ROWS>(v, one, other, &mut m[block * LANES..], to.columns);
+                for weights in weights.chunks_exact(2 * from.columns) {
+                    product::<Vector<S, f32>, WIDE_ROWS, 2>(v, from, weights, &mut m[block * LANES..], to);
                     block += 2;
                 }
             }
             for weights in weights[block * from.columns..].chunks_exact(from.columns) {
-                if is_wide::<S>() {
-                    product_of_block::<S, WIDE_ROWS>(v, weights, &mut m[block * LANES..], to.columns);
-                } else {
-                    product_of_block::<S, ROWS>(v, weights, &mut m[block * LANES..], to.columns);
+                let m = &mut m[block * LANES..];
+                match parts::<S>() {
+                    Some(1) => product::<Vector<S, f32>, WIDE_ROWS, 1>(v, from, weights, m, to),
+                    Some(2) => product::<Vector<S, f32>, ROWS, 2>(v, from, weights, m, to),
+                    Some(4) => product::<Vector<S, f32>, ROWS, 4>(v, from, weights, m, to),
+                    _ => product::<Lanes, ROWS, 1>(v, from, weights, m, to),
                 }
                 block += 1;
             }
@@ -54,76 +55,37 @@ pub(super) fn products<S: Simd>(v: &[f32], from: Matrices, weights: &[Lanes], m:
     }
 }
 
-/// Returns `P` rows from `first` on; the last row stands in for those behind it.
+/// Computes the blocks of columns that `N` parts fill, `P` rows at a time.
 #[inline(always)]
-fn rows_of<const P: usize>(v: &[f32], width: usize, first: usize) -> [(usize, &[f32]); P] {
-    let last = v.len() / width - 1;
-    let mut rows = [(0, &v[..0]); P];
-    for (p, to) in rows.iter_mut().enumerate() {
-        let row = (first + p).min(last);
-        *to = (row, &v[row * width..][..width]);
-    }
-    rows
-}
-
-/// Returns a block of 16 numbers of each row.
-#[inline(always)]
-fn blocks_of<'a, const P: usize>(rows: &[(usize, &'a [f32]); P], block: usize) -> [&'a [f32]; P] {
-    let mut blocks = [rows[0].1; P];
-    for p in 0..P {
-        blocks[p] = &rows[p].1[block * LANES..][..LANES];
-    }
-    blocks
-}
-
-#[inline(always)]
-fn product_of_block<S: Simd, const P: usize>(v: &[f32], weights: &[Lanes], to: &mut [f32], outputs: usize) {
-    for first in (0..v.len() / weights.len()).step_by(P) {
-        let rows = rows_of::<P>(v, weights.len(), first);
-        let mut sums = [[0.0; LANES]; P];
-        for (block, weights) in weights.as_chunks::<LANES>().0.iter().enumerate() {
-            let x = blocks_of::<P>(&rows, block);
-            for (k, &weights) in weights.iter().enumerate() {
-                for p in 0..P {
-                    let x = x[p][k];
-                    for l in 0..LANES {
-                        sums[p][l] = fused::<S>(x, weights[l], sums[p][l]);
-                    }
+fn product<T: Part, const P: usize, const N: usize>(
+    v: &[f32],
+    from: Matrices,
+    weights: &[Lanes],
+    to: &mut [f32],
+    Matrices { columns, .. }: Matrices,
+) {
+    let width = from.columns;
+    for first in (0..from.rows).step_by(P) {
+        // The last row stands in for those behind it.
+        let mut rows = [(0, &v[..0]); P];
+        for p in 0..P {
+            let row = (first + p).min(from.rows - 1);
+            rows[p] = (row, &v[row * width..][..width]);
+        }
+        let mut sums = [[T::of(0.0); N]; P];
+        for k in 0..width {
+            let weights = row_of::<T, N>(weights, width, k);
+            for p in 0..P {
+                let x = T::of(rows[p].1[k]);
+                for n in 0..N {
+                    sums[p][n] = sums[p][n].plus(x, weights[n]);
                 }
             }
         }
         for p in 0..P {
-            to[rows[p].0 * outputs..][..LANES].copy_from_slice(&sums[p]);
-        }
-    }
-}
-
-/// Does [`product_of_block`] for two blocks at once, and reads the rows only once. The sums of both in one array
-/// would not stay in registers.
-#[inline(always)]
-fn product_of_pair<S: Simd, const P: usize>(v: &[f32], one: &[Lanes], other: &[Lanes], to: &mut [f32], outputs: usize) {
-    for first in (0..v.len() / one.len()).step_by(P) {
-        let rows = rows_of::<P>(v, one.len(), first);
-        let (mut sums0, mut sums1) = ([[0.0; LANES]; P], [[0.0; LANES]; P]);
-        let weights = one.as_chunks::<LANES>().0.iter().zip(other.as_chunks::<LANES>().0);
-        for (block, (one, other)) in weights.enumerate() {
-            let x = blocks_of::<P>(&rows, block);
-            for (k, (&weights0, &weights1)) in one.iter().zip(other).enumerate() {
-                for p in 0..P {
-                    let x = x[p][k];
-                    for l in 0..LANES {
-                        sums0[p][l] = fused::<S>(x, weights0[l], sums0[p][l]);
-                    }
-                    for l in 0..LANES {
-                        sums1[p][l] = fused::<S>(x, weights1[l], sums1[p][l]);
-                    }
-                }
+            for n in 0..N {
+                sums[p][n].write(&mut to[rows[p].0 * columns + n * T::len()..]);
             }
-        }
-        for p in 0..P {
-            let to = &mut to[rows[p].0 * outputs..];
-            to[..LANES].copy_from_slice(&sums0[p]);
-            to[LANES..2 * LANES].copy_from_slice(&sums1[p]);
         }
     }
 }
@@ -138,17 +100,18 @@ pub(super) fn add_products<S: Simd>(v: &[f32], from: Matrices, grad: &[f32], to:
             let v = &v[..from.rows * from.columns];
             let mut block = 0;
             if is_wide::<S>() {
-                for pair in sums.chunks_exact_mut(2 * from.columns) {
-                    let (one, other) = pair.split_at_mut(from.columns);
-                    add_to_pair::<S, WIDE_ROWS>(v, &grad[block * LANES..], to.columns, one, other);
+                for sums in sums.chunks_exact_mut(2 * from.columns) {
+                    add_product::<Vector<S, f32>, WIDE_ROWS, 2>(v, from, &grad[block * LANES..], to, sums);
                     block += 2;
                 }
             }
             for sums in sums[block * from.columns..].chunks_exact_mut(from.columns) {
-                if is_wide::<S>() {
-                    add_to_block::<S, WIDE_ROWS>(v, &grad[block * LANES..], to.columns, sums);
-                } else {
-                    add_to_block::<S, ROWS>(v, &grad[block * LANES..], to.columns, sums);
+                let grad = &grad[block * LANES..];
+                match parts::<S>() {
+                    Some(1) => add_product::<Vector<S, f32>, WIDE_ROWS, 1>(v, from, grad, to, sums),
+                    Some(2) => add_product::<Vector<S, f32>, ROWS, 2>(v, from, grad, to, sums),
+                    Some(4) => add_product::<Vector<S, f32>, ROWS, 4>(v, from, grad, to, sums),
+                    _ => add_product::<Lanes, ROWS, 1>(v, from, grad, to, sums),
                 }
                 block += 1;
             }
@@ -156,58 +119,36 @@ pub(super) fn add_products<S: Simd>(v: &[f32], from: Matrices, grad: &[f32], to:
     }
 }
 
+/// Adds to the blocks of sums that `N` parts fill, `P` rows of them at a time.
 #[inline(always)]
-fn add_to_block<S: Simd, const P: usize>(v: &[f32], grad: &[f32], outputs: usize, sums: &mut [Lanes]) {
-    let inputs = sums.len();
-    for (tile, sums) in sums.chunks_exact_mut(P).enumerate() {
-        let mut tile_sums = [[0.0; LANES]; P];
-        tile_sums.copy_from_slice(sums);
-        let mut at = tile * P;
-        for row in 0..v.len() / inputs {
-            let grad = *lanes_at(grad, row * outputs);
-            for p in 0..P {
-                let x = v[at + p];
-                for l in 0..LANES {
-                    tile_sums[p][l] = fused::<S>(x, grad[l], tile_sums[p][l]);
-                }
-            }
-            at += inputs;
-        }
-        sums.copy_from_slice(&tile_sums);
-    }
-}
-
-/// Does [`add_to_block`] for two blocks at once.
-#[inline(always)]
-fn add_to_pair<S: Simd, const P: usize>(
+fn add_product<T: Part, const P: usize, const N: usize>(
     v: &[f32],
+    from: Matrices,
     grad: &[f32],
-    outputs: usize,
-    one: &mut [Lanes],
-    other: &mut [Lanes],
+    to: Matrices,
+    sums: &mut [Lanes],
 ) {
-    let inputs = one.len();
-    for (tile, (one, other)) in one.chunks_exact_mut(P).zip(other.chunks_exact_mut(P)).enumerate() {
-        let (mut sums0, mut sums1) = ([[0.0; LANES]; P], [[0.0; LANES]; P]);
+    let inputs = from.columns;
+    for first in (0..inputs).step_by(P) {
+        let mut tile = [[T::of(0.0); N]; P];
         for p in 0..P {
-            (sums0[p], sums1[p]) = (one[p], other[p]);
+            tile[p] = row_of(sums, inputs, first + p);
         }
-        let mut at = tile * P;
-        for row in 0..v.len() / inputs {
-            let (grad0, grad1) = (*lanes_at(grad, row * outputs), *lanes_at(grad, row * outputs + LANES));
+        for row in 0..from.rows {
+            let Some(x) = v[row * inputs + first..].first_chunk::<P>() else { unreachable!("rows are whole blocks") };
+            let mut of_grad = [T::of(0.0); N];
+            for n in 0..N {
+                of_grad[n] = T::read(&grad[row * to.columns + n * T::len()..]);
+            }
             for p in 0..P {
-                let x = v[at + p];
-                for l in 0..LANES {
-                    sums0[p][l] = fused::<S>(x, grad0[l], sums0[p][l]);
-                }
-                for l in 0..LANES {
-                    sums1[p][l] = fused::<S>(x, grad1[l], sums1[p][l]);
+                let x = T::of(x[p]);
+                for n in 0..N {
+                    tile[p][n] = tile[p][n].plus(x, of_grad[n]);
                 }
             }
-            at += inputs;
         }
         for p in 0..P {
-            (one[p], other[p]) = (sums0[p], sums1[p]);
+            write_row(tile[p], sums, inputs, first + p);
         }
     }
 }
