@@ -93,11 +93,15 @@ impl Part<'_> {
         // Rows of wide layers would share few lines of the cache, so they are copied, with an odd number of lines for each. A
         // few numbers beyond a row are read and not used.
         let stride = ((rows + WIDE_ROWS).div_ceil(LANES) | 1) * LANES;
-        let starts: Vec<usize> = (0..BLOCK).map(|row| row * stride).collect();
-        let mut seen = KeptMemory::zeros(BLOCK * stride);
+        let starts: Vec<usize> = (0..BLOCK.min(self.places.len())).map(|row| row * stride).collect();
+        let mut seen = KeptMemory::take(starts.len() * stride);
         for (x, places) in x.chunks(BLOCK * inputs).zip(self.places.chunks(BLOCK)) {
             for (to, x) in seen.chunks_exact_mut(stride).zip(x.chunks_exact(inputs)) {
-                to[..rows].copy_from_slice(&x[self.first..][..rows]);
+                // Whole blocks are copied without a call.
+                let (blocks, rest) = x[self.first..][..rows].as_chunks::<LANES>();
+                let (to_blocks, _) = to.as_chunks_mut();
+                to_blocks.iter_mut().zip(blocks).for_each(|(to, x)| *to = *x);
+                to[LANES * blocks.len()..][..rest.len()].copy_from_slice(rest);
             }
             outer(&seen, &starts[..places.len()], window, y, places, sums);
         }
