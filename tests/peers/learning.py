@@ -6,6 +6,7 @@ one thread per core, and an allocator that keeps its memory (set by `run`).
 
 import argparse
 import json
+import os
 import platform
 import re
 import statistics
@@ -18,6 +19,9 @@ from torch.nn import functional as F
 
 import report
 from networks import Skills, impala, mlp, nature
+
+# The vector instructions that both are limited to; none without a name.
+LIMIT = os.environ.get("PLAYBOT_INSTRUCTIONS", "")
 
 # Seconds for which a case is timed in a round, after the warm-up.
 SECONDS = 3.0
@@ -105,18 +109,19 @@ def ours(bench, case):
 
 def machine():
     names = re.findall(r"model name\s*:\s*(.+)", Path("/proc/cpuinfo").read_text())
-    return f"{names[0] if names else platform.processor()}, {torch.get_num_threads()} cores"
+    limit = f", both limited to {LIMIT.upper()}" if LIMIT else ""
+    return f"{names[0] if names else platform.processor()}, {torch.get_num_threads()} cores{limit}"
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("bench", help="the built benchmark `training` of playbot_learner")
     parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--case", default="", help="only cases whose names contain this")
+    parser.add_argument("--case", action="append", help="only cases whose names contain this (repeatable)")
     parser.add_argument("--json", type=Path, help="file for all times")
     parser.add_argument("--write", type=Path, help="document that gets the table")
     args = parser.parse_args()
-    cases = [case for case in CASES if args.case in case]
+    cases = [case for case in CASES if not args.case or any(word in case for word in args.case)]
     times = {case: {"ours": [], "theirs": []} for case in cases}
     for number in range(args.rounds):
         for case in cases:
@@ -129,7 +134,7 @@ def main():
     if args.json:
         args.json.write_text(json.dumps({"machine": machine(), "torch": torch.__version__, "times": times}, indent=1))
     if args.write:
-        report.put(args.write, "learning", text)
+        report.put(args.write, f"learning{'-' + LIMIT if LIMIT else ''}", text)
 
 
 def markdown(times):

@@ -248,8 +248,11 @@ impl<F: Fn(usize) -> Lanes, G: FnMut(usize, usize, &Lanes)> Strips<'_, F, G> {
     ) -> usize {
         let starts = &self.starts[from..];
         let count = starts.len().min(P);
-        let mut at = [starts[0]; P];
-        at[..count].copy_from_slice(&starts[..count]);
+        let mut at = [0; P];
+        for p in 0..P {
+            // The last one stands in for those behind it.
+            at[p] = starts[p.min(count - 1)];
+        }
         let sums = tile_sums::<T, P, N>(self.x, at, self.window, weights, first);
         let mut found = [[0.0; LANES]; 2];
         for p in 0..P {

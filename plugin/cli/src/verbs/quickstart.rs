@@ -54,7 +54,7 @@ const SKILLS: &str = "skills.safetensors";
 /// Learn skills, train SCORE-PPO and PPO, test both on unseen levels, write a report.
 ///
 /// Both train for the same number of steps on the experiment's training levels, with its recordings. Behaviour cloning
-/// and the blind baselines are measured beside them, on levels of layouts that none of them has seen. The steps to
+/// and the blind baselines are measured beside them, on levels of layouts that none of them has seen. Then the steps to
 /// success, at which a method mostly succeeds, are measured with further seeds, which train only that long.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
@@ -136,27 +136,19 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
             return Ok(stopped(&args, algorithm));
         }
     }
-    let Some((seeds, first)) = first_success(game, &experiment, &trained, &dataset, &args)? else {
-        report!("stopped; {}", interrupt::remains());
-        return Ok(Outcome::Stopped);
-    };
+    interrupt::leave(format!("both trainings are saved in {}, without a report", args.run.display()));
+    interrupt::go_on_with(format!("`{} eval --run {}`", program::name(), args.run.join("score-ppo").display()));
     let mut players: Vec<_> = trained.iter().map(|one| (one.algorithm.name().to_owned(), one.player.clone())).collect();
     players.push(("bc".to_owned(), behaviour_cloning(&skills, &experiment, draw)));
     players.extend(game.tools().bots.blind_bots().into_iter().map(|(name, bot)| (name.to_owned(), Player::Blind(bot))));
     let known = known_levels(game, &experiment, &skills);
-    let mut rows = Vec::new();
+    let (mut rows, mut lines) = (Vec::new(), Vec::new());
     for (name, player) in &players {
         let all = experiment.eval_plan(&experiment.test, args.threads.count());
         let plan = EvalPlan { left_out: known.left_out.clone(), ..all };
         let mut measured = player::measure(game, name, player, &plan)?;
         (measured.summary.seen, measured.summary.layouts) = (known.seen, known.layouts);
-        if args.json {
-            let mut line = json!(measured.summary);
-            if let Some(one) = first.iter().find(|one| one.algorithm.name() == name) {
-                line["steps_to_success"] = json!(one.steps);
-            }
-            print_line(line)?;
-        }
+        lines.push(json!(measured.summary));
         let mut row = measured.into_row();
         if let Some(one) = trained.iter().find(|one| one.algorithm.name() == name) {
             row.steps_per_s = Some(one.steps_per_s);
@@ -166,11 +158,31 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     if !args.json {
         print_line(to_text_table(&rows))?;
     }
-    let comparison = format!("{}; {}", headline(&first, &seeds, experiment.study.threshold), compare(&trained));
-    report!("{comparison}");
-    let report = args.run.join("report.html");
-    write_report(&report, &experiment, &trained, &rows, &comparison, start.elapsed().as_secs_f64())?;
-    report!("report: {} ({:.0} s in all)", report.display(), start.elapsed().as_secs_f64());
+    let (report, comparison) = (args.run.join("report.html"), compare(&trained));
+    let write = |words: &str| {
+        write_report(&report, &experiment, &trained, &rows, words, start.elapsed().as_secs_f64())?;
+        report!("{words}");
+        report!("report: {} ({:.0} s in all)", report.display(), start.elapsed().as_secs_f64());
+        Ok::<_, CliError>(())
+    };
+    if args.seeds > 1 {
+        // Their training may take as long as all before.
+        write(&comparison)?;
+        report!("steps to success: {} more", counted(args.seeds - 1, "seed"));
+    }
+    let Some((seeds, first)) = first_success(game, &experiment, &trained, &dataset, &args)? else {
+        report!("stopped; {}", interrupt::remains());
+        return Ok(Outcome::Stopped);
+    };
+    if args.json {
+        for mut line in lines {
+            if let Some(one) = first.iter().find(|one| line["method"] == one.algorithm.name()) {
+                line["steps_to_success"] = json!(one.steps);
+            }
+            print_line(line)?;
+        }
+    }
+    write(&format!("{}; {comparison}", headline(&first, &seeds, experiment.study.threshold)))?;
     Ok(Outcome::Pass)
 }
 
@@ -301,8 +313,7 @@ fn first_success(
     dataset: &Dataset,
     args: &Args,
 ) -> Result<Option<(Vec<u64>, Vec<FirstSuccess>)>, CliError> {
-    interrupt::leave(format!("both trainings are saved in {}, without a report", args.run.display()));
-    interrupt::go_on_with(format!("`{} eval --run {}`", program::name(), args.run.join("score-ppo").display()));
+    interrupt::leave(format!("both trainings and their report are saved in {}, without the steps to success", args.run.display()));
     let of = |one: &Trained| FirstSuccess { algorithm: one.algorithm, steps: vec![one.steps_to_threshold] };
     let (mut seeds, mut first) = (vec![experiment.seed], trained.iter().map(of).collect::<Vec<_>>());
     let algorithms: Vec<_> = trained.iter().map(|one| one.algorithm).collect();
