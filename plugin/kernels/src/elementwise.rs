@@ -252,8 +252,14 @@ fn put(to: &mut [f32], at: usize, count: usize, lanes: &Lanes, change: impl Fn(&
                 change(&mut to[l], lanes[l]);
             }
         }
-        _ => to[..count.min(LANES)].iter_mut().zip(lanes).for_each(|(to, &x)| change(to, x)),
+        _ => put_few(&mut to[..count.min(LANES)], lanes, change),
     }
+}
+
+/// Changes fewer numbers. In one function with the above, compilers make one copy of unknown length of both.
+#[inline(never)]
+fn put_few(to: &mut [f32], lanes: &Lanes, change: impl Fn(&mut f32, f32)) {
+    to.iter_mut().zip(lanes).for_each(|(to, &x)| change(to, x));
 }
 
 #[cfg(test)]

@@ -255,12 +255,11 @@ impl<F: Fn(usize) -> Lanes, G: FnMut(usize, usize, &Lanes)> Strips<'_, F, G> {
         }
         let sums = tile_sums::<T, P, N>(self.x, at, self.window, weights, first);
         let mut found = [[0.0; LANES]; 2];
-        for p in 0..P {
-            if p < count {
-                write_row(sums[p], &mut found, 1, 0);
-                for of in 0..blocks::<T, N>() {
-                    (self.store)(from + p, block + of, &found[of]);
-                }
+        // A loop: compilers do not inline what is called from many places.
+        for (p, sums) in sums[..count].iter().enumerate() {
+            write_row(*sums, &mut found, 1, 0);
+            for of in 0..blocks::<T, N>() {
+                (self.store)(from + p, block + of, &found[of]);
             }
         }
         count
