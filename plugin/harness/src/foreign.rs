@@ -91,7 +91,7 @@ use bevy_playbot::{
     action::ActionSpace,
     agent::Agent,
     engine::{Renewal, has_no_actions, tasks_in_order},
-    headless::HeadlessPlugins,
+    headless::{HeadlessPlugins, set_frame_rate},
     legal::LegalActions,
     observation::{ObservationSpace, VectorSensor},
     placement::TickPlacement,
@@ -619,6 +619,14 @@ impl HostTools for ForeignGame {
     fn windowed_plugins(&self, plugins: PluginGroupBuilder) -> PluginGroupBuilder {
         let plugins = if self.description.waits_for_tasks { plugins.set(tasks_in_order(default())) } else { plugins };
         self.description.changed_plugins(plugins)
+    }
+
+    fn bare_app(&self) -> Option<App> {
+        let mut app = App::new();
+        app.add_plugins(self.headless_plugins(HeadlessPlugins::default()));
+        set_frame_rate(&mut app, self.tick_hz());
+        self.description.add_to(self, &mut app);
+        Some(app)
     }
 
     fn arenas_per_world(&self) -> Option<u32> {

@@ -289,6 +289,12 @@ pub trait HostTools: Send + Sync {
         plugins
     }
 
+    /// Returns the game alone, in an app without playbot whose frames are ticks, to measure what playbot adds to them. `None`
+    /// if it has no such form. Nobody plays, and no episode ends.
+    fn bare_app(&self) -> Option<App> {
+        None
+    }
+
     /// Returns the most arenas that one World can hold: 1 for a game with one player or with global resources. Returns
     /// `None` for any number. More arenas are spread over more Worlds; one agent too many is a fault.
     fn arenas_per_world(&self) -> Option<u32> {

@@ -6,7 +6,7 @@ use crate::{
     level_files::is_level_files,
     sensors::GameSensors,
 };
-use bevy::prelude::*;
+use bevy::{app::Main, ecs::schedule::SingleThreadedExecutor, prelude::*};
 use bevy_playbot::{
     action::ActionValue,
     agent::{Agent, AgentOrder},
@@ -203,6 +203,26 @@ fn build_game(
     add_game(game, &mut app, mode, observation_config, seed)?;
     PanicReports::new(game.demo_header(mode), std::env::temp_dir()).add_to(&mut app);
     Ok(into_world(app))
+}
+
+/// Builds a World of a game [alone](crate::game::HostTools::bare_app), to run its frames with [`run_bare`]. Its systems run
+/// on the calling thread, as those of all Worlds do. `None` if the game has no such form.
+pub fn build_bare_world(game: &dyn Game) -> Option<World> {
+    let mut app = game.tools().host.bare_app()?;
+    app.finish();
+    app.cleanup();
+    for (_, schedule) in app.world_mut().resource_mut::<Schedules>().iter_mut() {
+        schedule.set_executor(SingleThreadedExecutor::new());
+    }
+    Some(std::mem::take(app.world_mut()))
+}
+
+/// Runs frames of a World without playbot, as `App::update` does.
+pub fn run_bare(world: &mut World, frames: u64) {
+    for _ in 0..frames {
+        world.run_schedule(Main);
+        world.clear_trackers();
+    }
 }
 
 /// Builds a World with agents and without the game, whose ticks all say how the game panicked.

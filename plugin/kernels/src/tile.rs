@@ -4,6 +4,10 @@
 //! Each sum is made by fused multiply-adds in a fixed order. It does not depend on the rest of the tile, on the width
 //! of vectors, on threads, or on whether the machine has such instructions.
 
+#![allow(clippy::needless_range_loop, reason = "indices by number keep sums in registers, and look alike")]
+
+use std::mem::MaybeUninit;
+
 use crate::instructions::macerator::{self, Scalar, Simd, VFma, Vector};
 
 /// Number of channels at a time.
@@ -359,27 +363,23 @@ pub(crate) fn outer<S: Simd>(
 ) {
     {
         let rows = window.count * window.len;
-        // Room for two blocks of channels.
-        let mut of_y = vec![Vector::<S, f32>::of(0.0); BLOCK.min(places.len()) * 2 * LANES / f32::lanes::<S>()];
         for (starts, places) in starts.chunks(BLOCK).zip(places.chunks(BLOCK)) {
             let pairs = Pairs { x, starts, places, window };
             let mut block = 0;
             if is_wide::<S>() {
                 for sums in sums.chunks_exact_mut(2 * rows) {
-                    pairs.add_all::<Vector<S, f32>, WIDE_ROWS, WIDE_ROWS, 2>(&y[block * LANES..], sums, &mut of_y);
+                    pairs.add_all::<Vector<S, f32>, WIDE_ROWS, WIDE_ROWS, 2>(&y[block * LANES..], sums);
                     block += 2;
                 }
             }
             for sums in sums[block * rows..].chunks_exact_mut(rows) {
                 let y = &y[block * LANES..];
                 match parts::<S>() {
-                    Some(1) if window.len == COLOURS => {
-                        pairs.add_all::<Vector<S, f32>, COLOURS, COLOURS, 1>(y, sums, &mut of_y)
-                    }
-                    Some(1) => pairs.add_all::<Vector<S, f32>, WIDE_ROWS, WIDE_ROWS, 1>(y, sums, &mut of_y),
-                    Some(2) => pairs.add_all::<Vector<S, f32>, ROWS, FEW_ROWS, 2>(y, sums, &mut of_y),
-                    Some(4) => pairs.add_all::<Vector<S, f32>, ROWS, FEW_ROWS, 4>(y, sums, &mut of_y),
-                    _ => pairs.add_all::<Lanes, ROWS, FEW_ROWS, 1>(y, sums, &mut [[0.0; LANES]; BLOCK]),
+                    Some(1) if window.len == COLOURS => pairs.add_all::<Vector<S, f32>, COLOURS, COLOURS, 1>(y, sums),
+                    Some(1) => pairs.add_all::<Vector<S, f32>, WIDE_ROWS, WIDE_ROWS, 1>(y, sums),
+                    Some(2) => pairs.add_all::<Vector<S, f32>, ROWS, FEW_ROWS, 2>(y, sums),
+                    Some(4) => pairs.add_all::<Vector<S, f32>, ROWS, FEW_ROWS, 4>(y, sums),
+                    _ => pairs.add_all::<Lanes, ROWS, FEW_ROWS, 1>(y, sums),
                 }
                 block += 1;
             }
@@ -399,21 +399,20 @@ impl Pairs<'_> {
     /// Adds the products of all numbers of each window to their sums, for the blocks that `N` parts fill: `P` numbers at a
     /// time, and `Q` where that leaves fewer places of the last tile empty.
     #[inline(always)]
-    fn add_all<T: Part, const P: usize, const Q: usize, const N: usize>(
-        &self,
-        y: &[f32],
-        sums: &mut [Lanes],
-        of_y: &mut [T],
-    ) {
+    #[expect(unsafe_code, reason = "as many numbers are read as were written")]
+    fn add_all<T: Part, const P: usize, const Q: usize, const N: usize>(&self, y: &[f32], sums: &mut [Lanes]) {
         // All of it is read for each tile, and rows that are far apart may share few lines of the cache.
-        let (of_y, _) = of_y.as_chunks_mut::<N>();
+        let mut of_y = [const { MaybeUninit::<[T; N]>::uninit() }; BLOCK];
         let of_y = &mut of_y[..self.places.len()];
         for (to, &place) in of_y.iter_mut().zip(self.places) {
             let y = &y[place..][..N * T::len()];
+            let mut parts = [T::of(0.0); N];
             for n in 0..N {
-                to[n] = T::read(&y[n * T::len()..]);
+                parts[n] = T::read(&y[n * T::len()..]);
             }
+            to.write(parts);
         }
+        let of_y = unsafe { of_y.assume_init_ref() };
         for piece in 0..self.window.count {
             let mut done = 0;
             while done < self.window.len {

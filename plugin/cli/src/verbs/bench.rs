@@ -6,7 +6,10 @@ use crate::{
     output::print_line,
 };
 use bevy::prelude::World;
-use bevy_playbot::vision::{ObservationConfig, ObservationKind, VisionError};
+use bevy_playbot::{
+    placement::TickPlacement,
+    vision::{ObservationConfig, ObservationKind, VisionError},
+};
 use playbot_harness::{
     benchmark::{Benchmark, StageClock},
     game::Game,
@@ -14,7 +17,7 @@ use playbot_harness::{
     parallel::{default_threads, on_threads},
     prelude::*,
     split::LevelSplit,
-    worlds::{Arrangement, build_observing_world, is_bound_to_its_thread},
+    worlds::{Arrangement, build_bare_world, build_observing_world, is_bound_to_its_thread, run_bare},
 };
 use playbot_learner::waited;
 use playbot_report::counted;
@@ -63,6 +66,9 @@ pub struct Args {
     list: bool,
 }
 
+/// Ticks of each World between two looks at the clock.
+const TICKS: u64 = 100;
+
 /// Returns the largest power of two that the cores and the default 64 arenas allow.
 fn threads_of_cases() -> usize {
     1 << default_threads().min(64).ilog2()
@@ -100,10 +106,14 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         let line = |case: &&&Case| if args.json { json!({ "case": case.name }).to_string() } else { case.name.clone() };
         return wanted.iter().try_for_each(|case| print_line(line(&case))).map(|()| Outcome::Pass);
     }
-    for (number, Case { name, game, benchmark }) in wanted.iter().enumerate() {
+    for (number, Case { name, game, benchmark, kind }) in wanted.iter().enumerate() {
         check_start(*game, benchmark.mode, 0)?;
         report!("{name}: case {} of {}, {} s at least", number + 1, wanted.len(), args.seconds);
-        let measure = if benchmark.train { train } else { simulate };
+        let measure = match kind {
+            Kind::Bare => bare,
+            Kind::Simulate => simulate,
+            Kind::Train => train,
+        };
         let measured = match measure(*game, benchmark.mode, benchmark.observation, &args, games) {
             Err(error) if args.case.is_empty() && error.is::<VisionError>() => {
                 report!("{name}: {error}");
@@ -135,6 +145,18 @@ struct Case<'a> {
     game: &'a dyn Game,
     /// Mode and observation to play it with.
     benchmark: Benchmark,
+    kind: Kind,
+}
+
+/// What a case measures.
+#[derive(Clone, Copy)]
+enum Kind {
+    /// The game alone.
+    Bare,
+    /// Random actions.
+    Simulate,
+    /// A learner.
+    Train,
 }
 
 /// Returns the measurements of the named game, or of all.
@@ -156,11 +178,17 @@ fn cases(game: &dyn Game) -> Vec<Case<'_>> {
     let of = |benchmark: Benchmark| Case {
         name: benchmark.name(game.name()),
         game: tools.benchmarked(&benchmark).unwrap_or(game),
+        kind: if benchmark.train { Kind::Train } else { Kind::Simulate },
         benchmark,
     };
     let vector = |mode| vec![Benchmark::simulate("vector", mode), Benchmark::train("vector", mode)];
     let default = || game.modes().first().copied().map_or_else(Vec::new, vector);
-    tools.benchmarks().unwrap_or_else(default).into_iter().map(of).collect()
+    let mut cases: Vec<_> = tools.benchmarks().unwrap_or_else(default).into_iter().map(of).collect();
+    if let (Some(mode), TickPlacement::Frame) = (game.modes().first(), game.tools().host.placement()) {
+        let benchmark = Benchmark::simulate("bare", mode);
+        cases.insert(0, Case { name: format!("bare/{}", game.name()), game, benchmark, kind: Kind::Bare });
+    }
+    cases
 }
 
 struct Measure {
@@ -211,6 +239,25 @@ impl Measure {
     }
 }
 
+/// Measures frames of the game alone, without agents and without playbot, in as many Worlds as there are arenas. What
+/// `sim/` takes more is playbot's, and the work of the game where somebody plays.
+fn bare(game: &dyn Game, _: &str, _: ObservationKind, args: &Args, _: &Games) -> Result<Measure, CliError> {
+    let mut worlds: Vec<_> = (0..args.arenas).filter_map(|_| build_bare_world(game)).collect();
+    let threads = if worlds.iter().any(is_bound_to_its_thread) { 1 } else { args.threads };
+    let advance = |worlds: &mut [World]| on_threads(worlds, threads, |world| run_bare(world, TICKS)).len();
+    // The game starts.
+    advance(&mut worlds);
+    let (start, mut steps, busy) = (Instant::now(), 0, busy_s());
+    while steps == 0 || start.elapsed().as_secs_f64() < args.seconds {
+        steps += advance(&mut worlds) as u64 * TICKS;
+    }
+    let seconds = start.elapsed().as_secs_f64();
+    let idle = idle_share(busy_s() - busy, seconds, args.threads);
+    let steps = steps as f64;
+    let parts = json!({ "simulate": microseconds(seconds * threads as f64, steps) });
+    Ok(Measure { steps_per_s: steps / seconds, parts, idle, update: None })
+}
+
 /// Measures random actions on up to 64 levels, with observations filled every tick.
 fn simulate(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, _: &Games) -> Result<Measure, CliError> {
     let observation_config = ObservationConfig { kind, ..ObservationConfig::default() };
@@ -231,7 +278,6 @@ fn simulate(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, _: 
     }
     worlds.iter_mut().for_each(|world| world.insert_resource(StageClock::default()));
     let threads = if worlds.iter().any(is_bound_to_its_thread) { 1 } else { args.threads };
-    const TICKS: u64 = 100;
     let (start, mut ticks, busy) = (Instant::now(), 0, busy_s());
     // At least once, so that a busy machine has a figure as well.
     while ticks == 0 || start.elapsed().as_secs_f64() < args.seconds {

@@ -313,7 +313,10 @@ fn first_success(
     dataset: &Dataset,
     args: &Args,
 ) -> Result<Option<(Vec<u64>, Vec<FirstSuccess>)>, CliError> {
-    interrupt::leave(format!("both trainings and their report are saved in {}, without the steps to success", args.run.display()));
+    interrupt::leave(format!(
+        "both trainings and their report are saved in {}, without the steps to success",
+        args.run.display()
+    ));
     let of = |one: &Trained| FirstSuccess { algorithm: one.algorithm, steps: vec![one.steps_to_threshold] };
     let (mut seeds, mut first) = (vec![experiment.seed], trained.iter().map(of).collect::<Vec<_>>());
     let algorithms: Vec<_> = trained.iter().map(|one| one.algorithm).collect();

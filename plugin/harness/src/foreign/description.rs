@@ -116,6 +116,14 @@ impl Description {
         }
     }
 
+    /// Adds the game's own plugin, which may read a level that an editor has drawn.
+    pub(super) fn add_to(&self, game: &ForeignGame, app: &mut App) {
+        if let Some(first) = game.editor_level("", 0) {
+            app.insert_resource(first.clone());
+        }
+        (self.plugin)(app);
+    }
+
     /// Returns the input of the agent at this place.
     pub(super) fn input_of(&self, place: usize) -> Input {
         self.agents.input_of(place % self.agents.count(), &self.input)
@@ -199,10 +207,7 @@ impl Plugin for ForeignPlugin {
         if description.waits_for_tasks {
             app.insert_resource(TasksEndWithFrames);
         }
-        if let Some(first) = self.game.editor_level("", 0) {
-            app.insert_resource(first.clone());
-        }
-        (description.plugin)(app);
+        description.add_to(&self.game, app);
         if !app.is_plugin_added::<VirtualInputPlugin>() {
             app.add_plugins(VirtualInputPlugin { route: InputRoute::Messages });
         }

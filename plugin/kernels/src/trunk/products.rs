@@ -3,6 +3,8 @@
 //! As in [`tile`](crate::tile), each sum is made by fused multiply-adds in a fixed order, whatever the width of
 //! vectors.
 
+#![allow(clippy::needless_range_loop, reason = "indices by number keep sums in registers, and look alike")]
+
 use crate::{
     instructions::macerator::{self, Simd, Vector},
     tile::{LANES, Lanes, Part, is_wide, parts, row_of, write_row},
