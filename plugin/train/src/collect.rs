@@ -50,7 +50,16 @@ struct Collecting {
     kind: ObsKind,
 }
 
-/// Episodes that ended during the rollout, in the order of ticks and agents.
+/// An episode that ended during a rollout.
+#[derive(Clone, Copy, Debug)]
+pub struct Ended {
+    /// The tick of the rollout, from 0 on.
+    pub tick: usize,
+    /// The episode.
+    pub episode: EpisodeEnded,
+}
+
+/// Episodes that ended in the last tick, in the order of the agents.
 #[derive(Resource, Default, Reflect)]
 #[reflect(Resource)]
 struct Finished(Vec<EpisodeEnded>);
@@ -128,12 +137,7 @@ impl Collector {
     /// # Errors
     ///
     /// The game's first breach of contract, with agent, level and tick.
-    pub fn collect(
-        &mut self,
-        policy: &Policy,
-        latent: usize,
-        steps: usize,
-    ) -> Result<(Rollout, Vec<EpisodeEnded>), Fault> {
+    pub fn collect(&mut self, policy: &Policy, latent: usize, steps: usize) -> Result<(Rollout, Vec<Ended>), Fault> {
         let kind = self.world.resource::<Collecting>().kind;
         let mut obs = Observations::empty(&kind);
         // One share has one column.
@@ -155,7 +159,7 @@ impl Collector {
         policy: &Policy,
         latent: usize,
         steps: usize,
-    ) -> Result<(Rollout, Vec<EpisodeEnded>), Fault> {
+    ) -> Result<(Rollout, Vec<Ended>), Fault> {
         let _playing = seat.play();
         self.world.insert_resource(seat.clone());
         let collected = self.collect_into(columns, policy, latent, steps);
@@ -175,13 +179,14 @@ impl Collector {
         policy: &Policy,
         latent: usize,
         steps: usize,
-    ) -> Result<(Rollout, Vec<EpisodeEnded>), Fault> {
+    ) -> Result<(Rollout, Vec<Ended>), Fault> {
         let world = &mut self.world;
         world.insert_resource(ActivePolicy { policy: policy.clone(), draw: ActionDraw::Sample });
         let kind = world.resource::<Collecting>().kind;
         let empty = Rollout::new(self.agents.len(), kind, latent, &policy.action_space());
         world.resource_mut::<Collecting>().rollout = empty.clone();
-        for _ in 0..steps {
+        let mut ended = Vec::new();
+        for tick in 0..steps {
             let ticked = tick_world(world);
             // What follows from a panic, or from another number of agents, says less.
             let is_panic = ticked.as_ref().is_err_and(|fault| fault.0.contains("panicked: "));
@@ -189,13 +194,15 @@ impl Collector {
                 return Err(Fault(why));
             }
             ticked?;
+            let finished = std::mem::take(&mut world.resource_mut::<Finished>().0);
+            ended.extend(finished.into_iter().map(|episode| Ended { tick, episode }));
             let seen = world.resource::<PolicyBatch>().observations();
             columns.fill_next(seen.as_slice()).map_err(|error| Fault(error.to_string()))?;
         }
         let mut rollout = std::mem::replace(&mut world.resource_mut::<Collecting>().rollout, empty);
         bootstrap_values(world, policy, &mut rollout).map_err(|error| Fault(error.to_string()))?;
         world.resource_mut::<Faults>().take()?;
-        Ok((rollout, std::mem::take(&mut world.resource_mut::<Finished>().0)))
+        Ok((rollout, ended))
     }
 
     pub(crate) fn world(&self) -> &World {

@@ -3,7 +3,7 @@
 
 use crate::{
     checkpoint::CheckpointSummary,
-    collect::{ArenaState, Collector, RestoreError, restore_arenas, save_arenas},
+    collect::{ArenaState, Collector, Ended, RestoreError, restore_arenas, save_arenas},
     error::TrainError,
     experiment::{Algorithm, Experiment, LearnerKind},
     metrics_log::{RECENT, Timing, UpdateReport},
@@ -231,12 +231,17 @@ impl Trainer {
             [.., last_but_one, last] if !is_bound && self.threads > 1 => *last - *last_but_one,
             _ => played.saturating_sub(shared_time() - shared),
         };
-        let (mut rollouts, mut finished) = (Vec::new(), Vec::new());
-        for part in collected {
+        let (mut rollouts, mut finished, mut agents) = (Vec::new(), Vec::new(), 0);
+        for (part, share) in collected.into_iter().zip(shares) {
             let (rollout, ended) = part?;
             rollouts.push(rollout);
-            finished.extend(ended);
+            let world = agents / self.per_world.max(1);
+            finished.extend(ended.into_iter().map(|ended| (world, ended)));
+            agents += share;
         }
+        // As if there were no more Worlds than the experiment has.
+        finished.sort_by_key(|(world, ended)| (*world, ended.tick));
+        let finished = finished.into_iter().map(|(_, ended)| ended.episode).collect();
         Ok(Collected { rollout: Rollout::join_around(obs, rollouts)?, finished, played, alone })
     }
 
@@ -355,7 +360,7 @@ struct Collected {
 }
 
 /// Result of a World's play.
-type OfWorld = Result<(Rollout, Vec<EpisodeEnded>), Fault>;
+type OfWorld = Result<(Rollout, Vec<Ended>), Fault>;
 
 /// Plays the Worlds with shared forward passes: the result is the same.
 fn collect_together(
