@@ -6,7 +6,6 @@ one thread per core, and an allocator that keeps its memory (set by `run`).
 
 import argparse
 import json
-import os
 import platform
 import re
 import statistics
@@ -19,9 +18,6 @@ from torch.nn import functional as F
 
 import report
 from networks import Skills, impala, mlp, nature
-
-# The vector instructions that both are limited to; none without a name.
-LIMIT = os.environ.get("PLAYBOT_INSTRUCTIONS", "")
 
 # Seconds for which a case is timed in a round, after the warm-up.
 SECONDS = 3.0
@@ -109,8 +105,7 @@ def ours(bench, case):
 
 def machine():
     names = re.findall(r"model name\s*:\s*(.+)", Path("/proc/cpuinfo").read_text())
-    limit = f", both limited to {LIMIT.upper()}" if LIMIT else ""
-    return f"{names[0] if names else platform.processor()}, {torch.get_num_threads()} cores{limit}"
+    return f"{names[0] if names else platform.processor()}, {torch.get_num_threads()} cores{report.limit()}"
 
 
 def main():
@@ -134,7 +129,7 @@ def main():
     if args.json:
         args.json.write_text(json.dumps({"machine": machine(), "torch": torch.__version__, "times": times}, indent=1))
     if args.write:
-        report.put(args.write, f"learning{'-' + LIMIT if LIMIT else ''}", text)
+        report.put(args.write, f"learning{report.suffix()}", text)
 
 
 def markdown(times):

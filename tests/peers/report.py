@@ -1,7 +1,11 @@
 """Tables in Markdown, and their insertion into a document."""
 
+import os
 import re
 from pathlib import Path
+
+# The vector instructions that both are limited to; all without a name.
+LIMIT = os.environ.get("PLAYBOT_INSTRUCTIONS", "")
 
 
 def number(x):
@@ -14,6 +18,16 @@ def table(header, rows):
     line = lambda cells: "| " + " | ".join(cells) + " |"
     rule = "|---|" + "---:|" * (len(header) - 1)
     return "\n".join([line(header), rule, *map(line, rows)])
+
+
+def limit():
+    """Returns the limit in words, for the name of the machine."""
+    return f", both limited to {LIMIT.upper()}" if LIMIT else ""
+
+
+def suffix():
+    """Returns what the name of a table with this limit ends with."""
+    return f"-{LIMIT}" if LIMIT else ""
 
 
 def put(document, name, text):

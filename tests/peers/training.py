@@ -196,7 +196,7 @@ def main():
     if args.json:
         args.json.write_text(json.dumps({"machine": machine(), "found": found}, indent=1))
     if args.write:
-        report.put(args.write, "training", text)
+        report.put(args.write, f"training{report.suffix()}", text)
 
 
 PARTS = ["simulate", "observe", "infer", "record", "gather", "learn"]
