@@ -30,7 +30,9 @@ use std::time::Instant;
 /// Numbers hold for this machine and this moment. Nothing is tested. The parts of a step are measured by the clock, for
 /// all threads together. Idle is the share of the threads' time in which this program did not compute: it waited, or
 /// other programs had the cores. The phases of an update follow one another: Worlds play, their parts are joined,
-/// minibatches are gathered, networks compute products, and the optimiser steps.
+/// minibatches are gathered, networks compute products, and the optimiser steps. `sim/` cases play random actions, `train/`
+/// cases learn. `bare/` cases run frames of a game with an adapter alone: what `sim/` takes more is playbot's, and the work
+/// of the game where something happens.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot bench --list
@@ -106,14 +108,9 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         let line = |case: &&&Case| if args.json { json!({ "case": case.name }).to_string() } else { case.name.clone() };
         return wanted.iter().try_for_each(|case| print_line(line(&case))).map(|()| Outcome::Pass);
     }
-    for (number, Case { name, game, benchmark, kind }) in wanted.iter().enumerate() {
+    for (number, Case { name, game, benchmark, measure }) in wanted.iter().enumerate() {
         check_start(*game, benchmark.mode, 0)?;
         report!("{name}: case {} of {}, {} s at least", number + 1, wanted.len(), args.seconds);
-        let measure = match kind {
-            Kind::Bare => bare,
-            Kind::Simulate => simulate,
-            Kind::Train => train,
-        };
         let measured = match measure(*game, benchmark.mode, benchmark.observation, &args, games) {
             Err(error) if args.case.is_empty() && error.is::<VisionError>() => {
                 report!("{name}: {error}");
@@ -145,19 +142,11 @@ struct Case<'a> {
     game: &'a dyn Game,
     /// Mode and observation to play it with.
     benchmark: Benchmark,
-    kind: Kind,
+    measure: Measuring,
 }
 
-/// What a case measures.
-#[derive(Clone, Copy)]
-enum Kind {
-    /// The game alone.
-    Bare,
-    /// Random actions.
-    Simulate,
-    /// A learner.
-    Train,
-}
+/// Measures a case: the game, the mode, what agents see, the command line and the program's games.
+type Measuring = fn(&dyn Game, &str, ObservationKind, &Args, &Games) -> Result<Measure, CliError>;
 
 /// Returns the measurements of the named game, or of all.
 fn cases_of<'a>(args: &Args, games: &'a Games) -> Result<Vec<Case<'a>>, CliError> {
@@ -178,7 +167,7 @@ fn cases(game: &dyn Game) -> Vec<Case<'_>> {
     let of = |benchmark: Benchmark| Case {
         name: benchmark.name(game.name()),
         game: tools.benchmarked(&benchmark).unwrap_or(game),
-        kind: if benchmark.train { Kind::Train } else { Kind::Simulate },
+        measure: if benchmark.train { train } else { simulate },
         benchmark,
     };
     let vector = |mode| vec![Benchmark::simulate("vector", mode), Benchmark::train("vector", mode)];
@@ -186,7 +175,7 @@ fn cases(game: &dyn Game) -> Vec<Case<'_>> {
     let mut cases: Vec<_> = tools.benchmarks().unwrap_or_else(default).into_iter().map(of).collect();
     if let (Some(mode), TickPlacement::Frame) = (game.modes().first(), game.tools().host.placement()) {
         let benchmark = Benchmark::simulate("bare", mode);
-        cases.insert(0, Case { name: format!("bare/{}", game.name()), game, benchmark, kind: Kind::Bare });
+        cases.insert(0, Case { name: format!("bare/{}", game.name()), game, benchmark, measure: bare });
     }
     cases
 }
