@@ -138,9 +138,6 @@ pub enum TestError {
         /// The range of levels.
         range: String,
     },
-    /// JUnit XML could not be written.
-    #[error("the results cannot be written as JUnit XML: {0}")]
-    Junit(String),
     /// The variable with the date of reports is no number of seconds.
     #[error(
         "the variable SOURCE_DATE_EPOCH is `{0}`, and dates junit.xml by whole seconds since 1970: write a number such as \
@@ -178,11 +175,7 @@ pub enum TestError {
 impl HasExitCode for TestError {
     fn exit_code(&self) -> u8 {
         match self {
-            Self::Eval(EvalError::Fault(_))
-            | Self::Finding(_)
-            | Self::Io { .. }
-            | Self::NotKept { .. }
-            | Self::Junit(_) => 2,
+            Self::Eval(EvalError::Fault(_)) | Self::Finding(_) | Self::Io { .. } | Self::NotKept { .. } => 2,
             _ => 3,
         }
     }

@@ -14,7 +14,7 @@ use crate::{
         error::{TestError, io_error},
         maps::level_argument,
         plan::{TestPlan, TestRecord, Tester, TesterRecord, testers},
-        reports::junit::junit,
+        reports::junit::write_junit,
         results::{Overview, RecordedTotal},
         statistics::{Trials, wilson},
     },
@@ -47,7 +47,7 @@ const MOST_CHANGES: usize = 20;
 /// The folder has no results, they are damaged, the files cannot be written, or [`report_date`] returns an error.
 pub fn write_reports(folder: &Path, comparison: Option<&Comparison>, program: &str) -> Result<Overview, TestError> {
     let overview = Overview::read(folder)?;
-    write(&folder.join(JUNIT), &junit(folder, program, report_date()?.as_deref())?)?;
+    write_junit(folder, program, report_date()?.as_deref())?;
     write(&folder.join(SUMMARY), &summary(&overview, comparison, program))?;
     if let Some(comparison) = comparison {
         let path = folder.join(AGAINST);

@@ -8,24 +8,22 @@ use crate::{
     findings::{DAY, Date},
     verdict::{
         LevelOutcome, LevelVerdict,
-        error::TestError,
+        error::{TestError, io_error},
         plan::{TestRecord, TesterRecord},
-        reports::{failure, rerun_commands},
+        reports::{JUNIT, failure, rerun_commands},
         results::ResultLines,
     },
 };
 use playbot_harness::level_files::is_level_files;
-use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
-use std::{env, ffi::OsStr, path::Path, time::Duration};
+use playbot_learner::write_atomically_with;
+use quick_xml::{
+    Writer,
+    events::{BytesDecl, BytesEnd, BytesStart, BytesText, Event},
+};
+use std::{env, ffi::OsStr, io, io::Write, path::Path, time::Duration};
 
 /// The host in every file: results are independent of the machine.
 const HOST: &str = "localhost";
-
-/// The attribute that [`quick_junit`] writes on `testsuites`, and the schema of Jenkins lacks.
-const REFUSED: &str = " skipped=\"0\"";
-
-/// Characters that XML 1.0 cannot hold, not even escaped, and [`quick_junit`] leaves in. Names of files may have them.
-const NO_CHARACTERS: [char; 2] = ['\u{fffe}', '\u{ffff}'];
 
 /// The variable with the date of files that can be made again, byte for byte: see
 /// <https://reproducible-builds.org/specs/source-date-epoch/>.
@@ -54,72 +52,179 @@ fn date(seconds: &OsStr) -> Result<String, TestError> {
     Ok(format!("{}T{hour:02}:{minute:02}:{:02}", Date::of_day(number / DAY), second % 60))
 }
 
-/// Converts the results in a folder, with this date. A level that was not solved, that has a finding, or that no longer
-/// ends as recorded, has failed.
-pub(super) fn junit(folder: &Path, program: &str, date: Option<&str>) -> Result<String, TestError> {
-    let mut lines = ResultLines::open(folder)?;
+/// Writes the results in a folder to `junit.xml` there, with this date. A level that was not solved, that has a finding, or
+/// that no longer ends as recorded, has failed.
+///
+/// The results are read twice, since a suite begins with its counts: a million levels take no more memory than one.
+pub(super) fn write_junit(folder: &Path, program: &str, date: Option<&str>) -> Result<(), TestError> {
+    let all = Totals::read(folder)?;
+    let path = folder.join(JUNIT);
+    write_atomically_with(&path, |file| write_suites(file, folder, program, date, &all))
+        .map_err(io_error("write", &path))
+}
+
+/// The counts and the time of a suite, or of all.
+#[derive(Default)]
+struct Totals {
+    tests: u64,
+    failures: u64,
+    time: Option<Duration>,
+}
+
+impl Totals {
+    fn read(folder: &Path) -> Result<Self, TestError> {
+        let (mut lines, mut totals) = (ResultLines::open(folder)?, Self::default());
+        while let Some(level) = lines.next_level()? {
+            totals.add(&level);
+        }
+        Ok(totals)
+    }
+
+    fn add(&mut self, level: &LevelVerdict) {
+        self.tests += 1;
+        self.failures += u64::from(!level.is_sound());
+        self.time = [self.time, time(level)].into_iter().flatten().reduce(Duration::saturating_add);
+    }
+}
+
+/// Returns the time of a level in the game. Results of older versions have none, and a file may hold any number.
+fn time(level: &LevelVerdict) -> Option<Duration> {
+    level.seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok())
+}
+
+fn write_suites(
+    file: &mut dyn Write,
+    folder: &Path,
+    program: &str,
+    date: Option<&str>,
+    all: &Totals,
+) -> io::Result<()> {
+    let mut lines = ResultLines::open(folder).map_err(io::Error::other)?;
     let record = lines.record().clone();
     let class = class(&record);
+    let mut xml = Xml { writer: Writer::new_with_indent(file, b' ', 4) };
+    xml.writer.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
     let name = format!("{} {}", record.game, record.range);
-    let has_files = is_level_files(&record.range.mode);
-    let mut suites: Vec<TestSuite> = Vec::new();
-    while let Some(level) = lines.next_level()? {
-        let case = test_case(&record, &level, program, &class);
-        match suites.last_mut() {
-            Some(suite) if !has_files => add(suite, case),
-            _ => {
-                let mut suite = suite(&record, has_files.then_some(level.level.as_str()), date);
-                add(&mut suite, case);
-                suites.push(suite);
-            }
+    let suites = xml.begin("testsuites", |tag| {
+        tag.text("name", &name);
+        tag.text("tests", &all.tests.to_string());
+        tag.text("failures", &all.failures.to_string());
+        tag.text("errors", "0");
+        tag.time(all.time);
+    })?;
+    if is_level_files(&record.range.mode) && all.tests > 0 {
+        while let Some(level) = lines.next_level().map_err(io::Error::other)? {
+            let mut one = Totals::default();
+            one.add(&level);
+            let suite = xml.begin("testsuite", |tag| name_suite(tag, &record, Some(&level.level), date, &one))?;
+            write_case(&mut xml, &record, &level, program, &class)?;
+            xml.end(suite)?;
+        }
+    } else {
+        let suite = xml.begin("testsuite", |tag| name_suite(tag, &record, None, date, all))?;
+        while let Some(level) = lines.next_level().map_err(io::Error::other)? {
+            write_case(&mut xml, &record, &level, program, &class)?;
+        }
+        xml.end(suite)?;
+    }
+    xml.end(suites)?;
+    xml.writer.write_indent()
+}
+
+/// Names the suite of all levels, or that of a level file. Readers that show failures at files read the suite's file,
+/// because a case may not have one.
+fn name_suite(tag: &mut Tag, record: &TestRecord, file: Option<&str>, date: Option<&str>, totals: &Totals) {
+    let levels = file.map_or_else(|| record.range.to_string(), str::to_owned);
+    tag.text("name", &format!("{} {levels}", record.game));
+    tag.text("tests", &totals.tests.to_string());
+    tag.text("skipped", "0");
+    tag.text("errors", "0");
+    tag.text("failures", &totals.failures.to_string());
+    tag.time(totals.time);
+    if let Some(date) = date {
+        tag.text("timestamp", date);
+    }
+    tag.text("hostname", HOST);
+    if let Some(file) = file {
+        tag.text("file", file);
+    }
+}
+
+fn write_case(
+    xml: &mut Xml<'_>,
+    record: &TestRecord,
+    level: &LevelVerdict,
+    program: &str,
+    class: &str,
+) -> io::Result<()> {
+    let mut case = Tag(BytesStart::new("testcase"));
+    case.text("name", &level.title());
+    case.text("classname", class);
+    case.time(time(level));
+    if level.is_sound() {
+        return xml.writer.write_event(Event::Empty(case.0));
+    }
+    let end = case.0.to_end().into_owned();
+    xml.writer.write_event(Event::Start(case.0))?;
+    let failed = xml.begin("failure", |tag| {
+        tag.text("message", &failure(level));
+        tag.text("type", kind(level));
+    })?;
+    xml.writer.write_event(Event::Text(BytesText::new(&of_xml(&description(record, level, program)))))?;
+    xml.end(failed)?;
+    xml.writer.write_event(Event::End(end))
+}
+
+/// An XML file that is being written.
+struct Xml<'a> {
+    writer: Writer<&'a mut dyn Write>,
+}
+
+impl Xml<'_> {
+    /// Begins an element with the attributes that `add` gives it, and returns its end.
+    fn begin(&mut self, name: &'static str, add: impl FnOnce(&mut Tag)) -> io::Result<BytesEnd<'static>> {
+        let mut tag = Tag(BytesStart::new(name));
+        add(&mut tag);
+        self.writer.write_event(Event::Start(tag.0))?;
+        Ok(BytesEnd::new(name))
+    }
+
+    fn end(&mut self, end: BytesEnd<'static>) -> io::Result<()> {
+        self.writer.write_event(Event::End(end))
+    }
+}
+
+/// The beginning of an element.
+struct Tag(BytesStart<'static>);
+
+impl Tag {
+    fn text(&mut self, key: &str, value: &str) {
+        self.0.push_attribute((key, of_xml(value).as_str()));
+    }
+
+    fn time(&mut self, time: Option<Duration>) {
+        if let Some(time) = time {
+            self.text("time", &format!("{:.3}", time.as_secs_f64()));
         }
     }
-    if suites.is_empty() {
-        suites.push(suite(&record, None, date));
-    }
-    let mut report = Report::new(name.as_str());
-    report.time = suites.iter().filter_map(|suite| suite.time).reduce(Duration::saturating_add);
-    report.add_test_suites(suites);
-    let text = report.to_string().map_err(|error| TestError::Junit(error.to_string()))?;
-    // The first occurrence is the one on `testsuites`: quotation marks in names before it are escaped.
-    Ok(text.replacen(REFUSED, "", 1).replace(NO_CHARACTERS, ""))
 }
 
-/// Makes the suite of all levels, or that of a level file. Readers that show failures at files read the suite's file,
-/// because a case may not have one.
-fn suite(record: &TestRecord, file: Option<&str>, date: Option<&str>) -> TestSuite {
-    let levels = file.map_or_else(|| record.range.to_string(), str::to_owned);
-    let mut suite = TestSuite::new(format!("{} {levels}", record.game));
-    if let Some(date) = date {
-        suite.extra.insert("timestamp".into(), date.into());
+/// Leaves out what XML 1.0 cannot hold, not even escaped, and the colours of a terminal. Names of files and messages of
+/// panics may have them.
+fn of_xml(text: &str) -> String {
+    let (mut kept, mut rest) = (String::with_capacity(text.len()), text.chars());
+    while let Some(c) = rest.next() {
+        match c {
+            '\u{1b}' if rest.as_str().starts_with('[') => {
+                // The bracket, and everything up to the letter that ends it.
+                rest.next();
+                rest.find(|c| matches!(c, '@'..='~'));
+            }
+            '\t' | '\n' | '\r' | ' '..='\u{fffd}' | '\u{10000}'.. => kept.push(c),
+            _ => {}
+        }
     }
-    suite.extra.insert("hostname".into(), HOST.into());
-    if let Some(file) = file {
-        suite.extra.insert("file".into(), file.into());
-    }
-    suite
-}
-
-/// Adds a case and its time to a suite.
-fn add(suite: &mut TestSuite, case: TestCase) {
-    suite.time = [suite.time, case.time].into_iter().flatten().reduce(Duration::saturating_add);
-    suite.add_test_case(case);
-}
-
-fn test_case(record: &TestRecord, level: &LevelVerdict, program: &str, class: &str) -> TestCase {
-    let status = if level.is_sound() {
-        TestCaseStatus::success()
-    } else {
-        let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
-        status.set_type(kind(level)).set_message(failure(level));
-        status.set_description(description(record, level, program));
-        status
-    };
-    let mut case = TestCase::new(level.title(), status);
-    case.set_classname(class);
-    // Results of older versions have no time, and a file may hold any number.
-    case.time = level.seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
-    case
+    kept
 }
 
 /// Returns the class of all cases: game, levels and testers. Build servers take cases of the same class and name for one,
@@ -186,8 +291,11 @@ mod tests {
         },
     };
     use playbot_harness::{detector::LevelProof, split::LevelSplit};
-    use quick_xml::{Reader, XmlVersion, events::Event};
-    use std::collections::{BTreeMap, BTreeSet};
+    use quick_xml::{Reader, XmlVersion};
+    use std::{
+        collections::{BTreeMap, BTreeSet},
+        fs,
+    };
 
     /// Elements of junit-10.xsd that are written: parent, name, required attributes, and others that are allowed. The
     /// schema lets the elements below a suite and a case come in any order.
@@ -324,7 +432,8 @@ mod tests {
         let (mut folder, _) = TestFolder::open(parent.path(), record, Earlier::Keep).expect("new");
         levels.iter().for_each(|level| folder.keep(level).expect("writable"));
         folder.finish().expect("writable");
-        let text = junit(parent.path(), "playbot", date).expect("results");
+        write_junit(parent.path(), "playbot", date).expect("results");
+        let text = fs::read_to_string(parent.path().join(JUNIT)).expect("written");
         check(&text);
         text
     }
