@@ -62,6 +62,9 @@ settings! {
     /// Learn only from recorded episodes that ended at the goal, for demonstrators that do not always get there.
     /// Episodes of games that go on at the goal end nowhere, and are left out.
     demo_wins: bool = false, serde(default, skip_serializing_if = "is_off");
+    /// Levels that the demonstrator has learned from, such as the training levels of a recorded policy. They count as
+    /// recorded: held-out levels with one of their layouts are no unseen ones.
+    demo_learned: Vec<LevelSplit> = Vec::new(), serde(default, skip_serializing_if = "Vec::is_empty");
     /// Random seed of everything.
     seed: u64 = one(), serde(default = "one");
     /// Random seeds of a study, which runs everything once with each; `seed` alone if the list is empty.
