@@ -133,6 +133,24 @@ fn a_killed_study_goes_on_to_the_same_files_and_repeats_nothing() {
 }
 
 #[test]
+fn runs_side_by_side_give_the_files_of_runs_in_turn() {
+    let folder = prepared();
+    let folder = folder.path();
+    let in_turn = ok(study(folder, "in-turn", &["--threads", "4", "--side-by-side", "1"]));
+    let expected = (written(folder), said(&in_turn));
+    // Four runs on a thread each, then two on two each; the seeds share their skills.
+    for runs in ["4", "2"] {
+        let beside = ok(study(folder, runs, &["--threads", "4", "--side-by-side", runs]));
+        assert_eq!((written(folder), said(&beside)), expected, "{runs} runs side by side");
+        let models = fs::read_dir(folder.join(runs)).expect("there").flatten();
+        let models = models.filter(|entry| entry.file_name().to_string_lossy().starts_with("skills-")).count();
+        assert_eq!(models, 2, "one for each seed, learned once");
+        let cost = fs::read_to_string(folder.join("out/cost.md")).expect("written");
+        assert!(!cost.contains('–'), "each run knows its cost: {cost}");
+    }
+}
+
+#[test]
 fn what_is_there_is_not_replaced_before_everything_can_be_read() {
     let folder = prepared();
     let folder = folder.path();

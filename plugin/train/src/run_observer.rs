@@ -161,6 +161,13 @@ pub enum RunEvent<'a> {
         /// The run.
         run: &'a StudyRun,
     },
+    /// A run of a study, one of several that go on side by side, has come further.
+    StudyRunAdvanced {
+        /// The run.
+        run: &'a StudyRun,
+        /// What it has done.
+        done: Advance,
+    },
     /// A run of a study was measured.
     StudyRunEnded {
         /// The run.
@@ -168,6 +175,20 @@ pub enum RunEvent<'a> {
         /// Its result.
         result: &'a StudyResult,
     },
+}
+
+/// How far a run has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Advance {
+    /// It learns skills.
+    Skills {
+        /// Batches done.
+        batches: u64,
+        /// Batches of all epochs.
+        of: u64,
+    },
+    /// It trains.
+    Steps(u64),
 }
 
 /// Contents of opened recordings.

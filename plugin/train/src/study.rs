@@ -9,6 +9,9 @@
 mod conditions;
 pub(crate) mod table;
 
+pub use crate::study::table::{
+    RESULTS, StudyOutputError, check_experiment_file, rewrite_table, write_cost, write_report,
+};
 use crate::{
     Algorithm,
     experiment::{Experiment, ExperimentError, Variant, error::ConfigError},
@@ -63,6 +66,9 @@ impl StudyRun {
         }
         if run.demo_wins {
             settings += "wins";
+        }
+        if !run.demo_learned.is_empty() {
+            settings += &ron::to_string(&run.demo_learned)?;
         }
         Ok(format!("skills-{:08x}-seed{}.safetensors", crc32fast::hash(settings.as_bytes()), run.seed))
     }

@@ -1,4 +1,11 @@
-//! The runs of a study: skills, training and measurement, each resumed where it was stopped.
+//! The runs of a study: skills, training and measurement, each resumed where it was stopped. They go on side by side, with
+//! as few threads each as there are enough runs for: several trainings share a machine better than one can use it.
+//!
+//! The folder has:
+//!
+//! - `side_by_side`: runs on threads of their own, what they share, and what they tell.
+
+mod side_by_side;
 
 use crate::{
     checkpoint::CheckpointChoice,
@@ -11,10 +18,8 @@ use crate::{
     run_dir::{OpenedRun, RunDir, RunError, RunInfo, RunLock, check_replaceable, end_replacement, is_unstarted},
     run_observer::{CountedWork, RunEvent, RunObserver},
     runs::{RunCurves, RunsError, settings_that_differ},
-    study::{
-        LearningCurves, StudyReport, StudyResult, StudyRun, TestResult, TrainingResult,
-        table::{CostClock, EXPERIMENT, EXPERIMENT_HEAD, cost_table},
-    },
+    study::{LearningCurves, StudyReport, StudyResult, StudyRun, TestResult, TrainingResult, table::CostClock},
+    study_runner::side_by_side::{SkillFiles, lock},
     train_run::{NewRun, Training, TrainingError, TrainingSetup, run_info},
     trainer::Trainer,
 };
@@ -24,15 +29,16 @@ use playbot_harness::{
     game::Game,
     games::Games,
     held_out::{HeldOut, seen_by_training},
-    sealed_file::{SealedFileError, io_error, read_sealed, write_atomically, write_sealed},
+    machine::free_memory,
+    sealed_file::{SealedFileError, io_error, read_sealed, write_sealed},
     split::LevelSplit,
 };
 use playbot_learner::{Dataset, FileError, HasExitCode, SeenLevels, SkillModel, disk};
-use playbot_report::{statistics::steps_to_reach, to_svg};
+use playbot_report::statistics::steps_to_reach;
 use std::{
     collections::BTreeSet,
-    fs,
     path::{Path, PathBuf},
+    sync::Mutex,
 };
 use thiserror::Error;
 
@@ -161,12 +167,13 @@ pub struct StudyRunner<'a> {
     /// Replace existing runs instead of resuming them.
     force: bool,
     setup: TrainingSetup<'a>,
-    /// Skill models that were learned already.
-    learned: BTreeSet<PathBuf>,
+    /// The most runs at a time.
+    side_by_side: Option<usize>,
+    skills: SkillFiles,
     /// Recordings that proved readable, with the levels that they show.
     checked: Vec<(RecordingsKey, SeenLevels)>,
     /// The last recordings that were read.
-    last: Option<(RecordingsKey, Dataset)>,
+    last: Mutex<Option<(RecordingsKey, Dataset)>>,
     /// Held-out levels that some run of the study knows. All runs are measured on the others.
     known: BTreeSet<u64>,
     /// The number of known levels that are measured like new ones, since there are no new ones.
@@ -190,17 +197,37 @@ struct TrainedRun {
 }
 
 /// Result of a run; `None` if the observer stopped it.
-pub type Ended = Option<(StudyResult, LearningCurves)>;
+type Ended = Option<(StudyResult, LearningCurves)>;
+
+/// Results of all runs; `None` if the observer stopped one.
+type AllEnded = Option<Vec<(StudyResult, LearningCurves)>>;
 
 impl<'a> StudyRunner<'a> {
     /// Makes a runner of runs in `folder`. With `force`, existing runs are replaced instead of resumed.
     pub fn new(games: &'a Games<'a>, folder: &Path, force: bool, setup: TrainingSetup<'a>) -> Self {
-        let (learned, checked, last, known) = (BTreeSet::new(), Vec::new(), None, BTreeSet::new());
-        Self { games, folder: folder.into(), force, setup, learned, checked, last, known, measured_known: 0 }
+        Self {
+            games,
+            folder: folder.into(),
+            force,
+            setup,
+            side_by_side: None,
+            skills: SkillFiles::default(),
+            checked: Vec::new(),
+            last: Mutex::default(),
+            known: BTreeSet::new(),
+            measured_known: 0,
+        }
     }
 
-    /// Brings all runs to their ends, one after the other, and returns the report with their results. `None` if the
-    /// observer stopped a run. All of them are measured on the held-out levels that are new to each.
+    /// Limits the number of runs that go on side by side. Without a limit there are as many as threads, and as have room in
+    /// the memory.
+    pub fn side_by_side(self, most: Option<usize>) -> Self {
+        Self { side_by_side: most, ..self }
+    }
+
+    /// Brings all runs to their ends, and returns the report with their results. `None` if the observer stopped a run. All of
+    /// them are measured on the held-out levels that are new to each. The results do not depend on how many runs go on side
+    /// by side.
     ///
     /// # Errors
     ///
@@ -214,17 +241,37 @@ impl<'a> StudyRunner<'a> {
         observer: &mut dyn RunObserver,
     ) -> Result<Option<StudyReport>, StudyRunError> {
         self.note_known(runs, &experiment, observer)?;
-        let mut report = StudyReport { command, experiment, results: Vec::new(), curves: Vec::new() };
+        let ended = match self.lanes(runs)? {
+            1 => self.run_in_turn(runs, observer)?,
+            lanes => self.run_side_by_side(runs, lanes, observer)?,
+        };
+        let Some(ended) = ended else { return Ok(None) };
+        let (results, curves) = ended.into_iter().unzip();
+        Ok(Some(StudyReport { command, experiment, results, curves }))
+    }
+
+    /// Returns how many runs go on side by side.
+    fn lanes(&self, runs: &[StudyRun]) -> Result<usize, StudyRunError> {
+        let mut largest = 1;
+        for run in runs {
+            largest = largest.max(run.experiment.memory(self.games.get(&run.experiment.game)?));
+        }
+        let fit = usize::try_from(free_memory() / largest).unwrap_or(usize::MAX);
+        let most = self.side_by_side.unwrap_or(usize::MAX);
+        Ok(self.setup.threads.min(most).min(fit).min(runs.len()).max(1))
+    }
+
+    fn run_in_turn(&self, runs: &[StudyRun], observer: &mut dyn RunObserver) -> Result<AllEnded, StudyRunError> {
+        let mut all = Vec::new();
         for (index, run) in runs.iter().enumerate() {
             observer.observe(RunEvent::StudyRunBegun { index, run });
-            let ended = self.run(run, observer)?;
+            let ended = self.run(run, CostClock::start(), self.setup.threads, observer)?;
             let is_last = index + 1 == runs.len();
-            let Some((result, curves)) = ended.filter(|_| is_last || !observer.stopped()) else { return Ok(None) };
-            observer.observe(RunEvent::StudyRunEnded { run, result: &result });
-            report.results.push(result);
-            report.curves.push(curves);
+            let Some(ended) = ended.filter(|_| is_last || !observer.stopped()) else { return Ok(None) };
+            observer.observe(RunEvent::StudyRunEnded { run, result: &ended.0 });
+            all.push(ended);
         }
-        Ok(Some(report))
+        Ok(Some(all))
     }
 
     /// Finds the held-out levels that some run knows: by number, as a file, or by their layout. A comparison of runs
@@ -304,8 +351,14 @@ impl<'a> StudyRunner<'a> {
         Ok(seen)
     }
 
-    /// Brings a run to its end.
-    fn run(&mut self, run: &StudyRun, observer: &mut dyn RunObserver) -> Result<Ended, StudyRunError> {
+    /// Brings a run to its end, on this many threads.
+    fn run(
+        &self,
+        run: &StudyRun,
+        clock: CostClock,
+        threads: usize,
+        observer: &mut dyn RunObserver,
+    ) -> Result<Ended, StudyRunError> {
         let game = self.games.get(&run.experiment.game)?;
         let folder = self.folder.join(run.id());
         end_replacement(&folder)?;
@@ -326,13 +379,12 @@ impl<'a> StudyRunner<'a> {
         disk::create_dir_all(&folder).map_err(io_error("create", &folder))?;
         let lock = RunLock::take(&folder)?;
         let dir = if is_saved { RunFolder::Begun(RunDir::open_with(lock)?.run) } else { RunFolder::New(lock) };
-        let clock = CostClock::start();
         // The folder is locked until the result is written.
-        let trained = self.train(game, run, dir, observer)?;
+        let trained = self.train(game, run, dir, threads, observer)?;
         clock.note(&folder)?;
         let Some(TrainedRun { dir: _dir, player, training, curves }) = trained else { return Ok(None) };
         let experiment = &run.experiment;
-        let (test, with_seen) = self.measure(game, run, &player, wants_all, observer)?;
+        let (test, with_seen) = self.measure(game, run, &player, (wants_all, threads), observer)?;
         let result = StudyResult {
             variant: run.variant.clone(),
             algorithm: experiment.algorithm,
@@ -400,7 +452,7 @@ impl<'a> StudyRunner<'a> {
         let (game, setup) = (self.games.get(&experiment.game)?, self.setup);
         match (self.force, key.with_rewards) {
             (false, _) => drop(find_recordings(experiment, setup.recordings, observer)?),
-            (true, false) => drop(self.dataset(game, experiment, observer)?),
+            (true, false) => drop(self.dataset(game, experiment, setup.threads, observer)?),
             (true, true) => drop(read_rollouts(game, experiment, setup.recordings, setup.threads, observer)?),
         }
         let seen = check_recordings(game, experiment, &key.path)?;
@@ -410,20 +462,23 @@ impl<'a> StudyRunner<'a> {
 
     /// Reads recordings, or returns the last ones if they are the same.
     fn dataset(
-        &mut self,
+        &self,
         game: &dyn Game,
         experiment: &Experiment,
+        threads: usize,
         observer: &mut dyn RunObserver,
     ) -> Result<Dataset, StudyRunError> {
         let key = self.recordings_key(experiment)?;
-        if let Some((known, dataset)) = &self.last
+        // Recordings may be large: runs that read the same wait for them.
+        let mut last = lock(&self.last);
+        if let Some((known, dataset)) = &*last
             && *known == key
         {
             return Ok(dataset.clone());
         }
         let path = find_recordings(experiment, self.setup.recordings, observer)?;
-        let dataset = read_dataset(game, experiment, &path, self.setup.threads, observer)?;
-        self.last = Some((key, dataset.clone()));
+        let dataset = read_dataset(game, experiment, &path, threads, observer)?;
+        *last = Some((key, dataset.clone()));
         Ok(dataset)
     }
 
@@ -484,17 +539,18 @@ impl<'a> StudyRunner<'a> {
 
     /// Trains a run that needs it. A folder to be replaced stays until its skills and recordings are there.
     fn train(
-        &mut self,
+        &self,
         game: &dyn Game,
         run: &StudyRun,
         run_folder: RunFolder,
+        threads: usize,
         observer: &mut dyn RunObserver,
     ) -> Result<Option<TrainedRun>, StudyRunError> {
-        let (experiment, setup) = (&run.experiment, self.setup);
+        let (experiment, setup) = (&run.experiment, TrainingSetup { threads, ..self.setup });
         let draw = if experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
         let begun = matches!(&run_folder, RunFolder::Begun(dir) if dir.checkpoint(CheckpointChoice::Last).is_ok());
         let skills = match experiment.algorithm.needs_skills() && !begun {
-            true => match self.skills(game, run, observer)? {
+            true => match self.skills(game, run, threads, observer)? {
                 Some(skills) => Some(skills),
                 None => return Ok(None),
             },
@@ -530,15 +586,17 @@ impl<'a> StudyRunner<'a> {
 
     /// Returns the skill model of a run, learned once for all runs that share it; `None` if the observer stopped that.
     fn skills(
-        &mut self,
+        &self,
         game: &dyn Game,
         run: &StudyRun,
+        threads: usize,
         observer: &mut dyn RunObserver,
     ) -> Result<Option<SkillModel>, StudyRunError> {
         let (file, experiment) = (self.skill_file(run)?, &run.experiment);
-        let is_new = self.force && !self.learned.contains(&file);
+        let _taken = self.skills.take(&file);
+        let is_new = self.force && !self.skills.is_learned(&file);
         if is_new || !file.exists() {
-            let dataset = self.dataset(game, experiment, observer)?;
+            let dataset = self.dataset(game, experiment, threads, observer)?;
             if is_new {
                 learn_skills::remove_checkpoint(&learn_skills::checkpoint_of(&file))?;
             }
@@ -546,7 +604,7 @@ impl<'a> StudyRunner<'a> {
             if learned.is_none() {
                 return Ok(None);
             }
-            self.learned.insert(file.clone());
+            self.skills.note_learned(&file);
         }
         self.load_skills(game, experiment, file).map(Some)
     }
@@ -571,7 +629,7 @@ impl<'a> StudyRunner<'a> {
         game: &dyn Game,
         run: &StudyRun,
         player: &Player,
-        wants_all: bool,
+        (wants_all, threads): (bool, usize),
         observer: &mut dyn RunObserver,
     ) -> Result<(TestResult, Option<TestResult>), EvalError> {
         let (name, split) = (run.id(), &run.experiment.test);
@@ -581,7 +639,7 @@ impl<'a> StudyRunner<'a> {
             seen,
             ..TestResult::from(summary)
         };
-        let all = run.experiment.eval_plan(split, self.setup.threads);
+        let all = run.experiment.eval_plan(split, threads);
         let new = EvalPlan { left_out: self.known.clone(), ..all.clone() };
         let mut episodes = play(game, &name, player, &new, observer)?;
         let summary = summarize(&name, split, &episodes);
@@ -662,114 +720,10 @@ fn learning_curves(run: &Path) -> Result<LearningCurves, RunsError> {
     Ok(LearningCurves { success: of(SUCCESS_RATE), returns: of(EPISODIC_RETURN) })
 }
 
-// The files of a study: tables, curves, and the cost of its runs.
-
-/// The file of results.
-pub const RESULTS: &str = "results.json";
-
-const TABLE: &str = "table.md";
-
-/// Failure to write the files of a study.
-#[derive(Debug, Error)]
-pub enum StudyOutputError {
-    /// The experiment cannot be written as text.
-    #[error("cannot write the experiment: {0}")]
-    Experiment(String),
-    /// A file in the place of the experiment was not written by a study.
-    #[error(
-        "{} is not from a study, and the experiment of this one would replace it: rename it, or choose another folder with \
-         --out", .0.display()
-    )]
-    OtherExperiment(PathBuf),
-    /// The results of an earlier study cannot be written as a table.
-    #[error("{file}: {message}")]
-    Results {
-        /// Their file.
-        file: String,
-        /// The problem.
-        message: String,
-    },
-    /// A file cannot be read or written.
-    #[error(transparent)]
-    File(#[from] SealedFileError),
-}
-
-impl HasExitCode for StudyOutputError {
-    fn exit_code(&self) -> u8 {
-        match self {
-            Self::Experiment(_) | Self::OtherExperiment(_) | Self::Results { .. } => 3,
-            Self::File(error) => error.exit_code(),
-        }
-    }
-}
-
-/// Writes `table.md`, `experiment.ron`, `curves.svg` and `results.json`.
-///
-/// # Errors
-///
-/// A file cannot be written, or an `experiment.ron` that is not a study's is in the folder.
-pub fn write_report(folder: &Path, report: &StudyReport) -> Result<(), StudyOutputError> {
-    let json = report.to_json().map_err(|error| StudyOutputError::Experiment(error.to_string()))?;
-    write_table(folder, report)?;
-    write_atomically(&folder.join("curves.svg"), to_svg(&report.charts()).as_bytes())?;
-    Ok(write_atomically(&folder.join(RESULTS), json.as_bytes())?)
-}
-
-/// Writes `table.md`, and the `experiment.ron` that it links.
-fn write_table(folder: &Path, report: &StudyReport) -> Result<(), StudyOutputError> {
-    check_experiment_file(folder)?;
-    let experiment = report.to_ron(folder).map_err(|error| StudyOutputError::Experiment(error.to_string()))?;
-    write_atomically(&folder.join(EXPERIMENT), experiment.as_bytes())?;
-    Ok(write_atomically(&folder.join(TABLE), report.to_markdown().as_bytes())?)
-}
-
-/// Checks that no `experiment.ron` is in the folder, except for one that a study wrote. Another one may be the very
-/// experiment of the study, or that of a run.
-///
-/// # Errors
-///
-/// [`StudyOutputError::OtherExperiment`].
-pub fn check_experiment_file(folder: &Path) -> Result<(), StudyOutputError> {
-    let path = folder.join(EXPERIMENT);
-    let is_own = fs::read(&path).is_ok_and(|text| text.starts_with(EXPERIMENT_HEAD.as_bytes()));
-    if is_own || !path.exists() { Ok(()) } else { Err(StudyOutputError::OtherExperiment(path)) }
-}
-
-/// Writes `table.md` and `experiment.ron` again from `results.json`. Learning curves are not in there, so `curves.svg`
-/// stays as it is.
-///
-/// # Errors
-///
-/// There are no results, they are damaged, or an `experiment.ron` that is not a study's is in the folder.
-pub fn rewrite_table(folder: &Path) -> Result<(), StudyOutputError> {
-    let path = folder.join(RESULTS);
-    let refused = |message: String| StudyOutputError::Results { file: path.display().to_string(), message };
-    if !path.exists() {
-        let message = "there is no such file: run the study, or name the folder of one that is done";
-        return Err(refused(message.to_owned()));
-    }
-    let (report, _) = read_sealed::<StudyReport>(&path)?;
-    write_table(folder, &report)
-}
-
-/// Writes `cost.md`: the cost of each variant, over its seeds, and the command.
-///
-/// # Errors
-///
-/// It cannot be written.
-pub fn write_cost(
-    folder: &Path,
-    runs: &[StudyRun],
-    runs_folder: &Path,
-    command: &str,
-    threads: usize,
-) -> Result<(), SealedFileError> {
-    write_atomically(&folder.join("cost.md"), cost_table(runs, runs_folder, command, threads).as_bytes())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     #[test]
     fn learning_curves_begin_once_a_hundred_episodes_have_ended() {
@@ -788,18 +742,5 @@ mod tests {
         let curves = write(&[(8, 40, 1.0), (16, 99, 0.1), (24, 100, 0.5), (32, 150, 0.75)]);
         assert_eq!((&curves.success, &curves.returns), (&vec![(24, 0.5), (32, 0.75)], &vec![(24, 0.5), (32, 0.75)]));
         assert_eq!(write(&[(8, 40, 1.0), (16, 99, 0.1)]), LearningCurves::default());
-    }
-
-    #[test]
-    fn an_experiment_that_no_study_wrote_is_not_replaced() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let file = folder.path().join(EXPERIMENT);
-        check_experiment_file(folder.path()).expect("none is there");
-        fs::write(&file, "(game: \"mine\")").expect("writable");
-        let error = check_experiment_file(folder.path()).expect_err("it would be lost");
-        assert!(matches!(&error, StudyOutputError::OtherExperiment(path) if *path == file), "{error}");
-        assert_eq!(error.exit_code(), 3);
-        fs::write(&file, format!("{EXPERIMENT_HEAD}`…`\n()")).expect("writable");
-        check_experiment_file(folder.path()).expect("a study's");
     }
 }

@@ -118,7 +118,7 @@ pub struct TrainingSetup<'a> {
     /// Revision of playbot's own code, which runs note.
     pub revision: &'a str,
     /// Returns the path of recordings from the one that an experiment names.
-    pub recordings: &'a dyn Fn(&Path) -> PathBuf,
+    pub recordings: &'a (dyn Fn(&Path) -> PathBuf + Sync),
 }
 
 impl TrainingSetup<'_> {

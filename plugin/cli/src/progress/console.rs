@@ -171,7 +171,7 @@ impl RunObserver for Console<'_> {
                 self.end_shared_bar();
                 report_clipped(summary);
             }
-            RunEvent::StudyRunBegun { .. } | RunEvent::StudyRunEnded { .. } => {}
+            RunEvent::StudyRunBegun { .. } | RunEvent::StudyRunAdvanced { .. } | RunEvent::StudyRunEnded { .. } => {}
         }
     }
 

@@ -20,16 +20,17 @@ use playbot_learner::DeviceKind;
 use playbot_train::{
     Experiment,
     run_dir::is_unstarted,
-    run_observer::{CountedWork, Counter, RunEvent, RunObserver},
-    study::{StudyError, StudyReport, StudyRun, study_runs, study_variants},
-    study_runner::{
-        RESULTS, StudyRunError, StudyRunner, check_experiment_file, rewrite_table, write_cost, write_report,
+    run_observer::{Advance, CountedWork, Counter, RunEvent, RunObserver},
+    study::{
+        RESULTS, StudyError, StudyReport, StudyRun, check_experiment_file, rewrite_table, study_runs, study_variants,
+        write_cost, write_report,
     },
+    study_runner::{StudyRunError, StudyRunner},
     train_run::{TrainingSetup, never_learns, rounded},
 };
 use serde_json::json;
 use std::{
-    collections::BTreeSet,
+    collections::{BTreeMap, BTreeSet},
     path::{Path, PathBuf},
 };
 
@@ -77,6 +78,10 @@ pub struct Args {
         conflicts_with_all = ["game", "experiment", "set", "variant", "seeds", "include_seen", "runs", "resume", "force", "json"]
     )]
     rewrite: bool,
+    /// Most runs that go on side by side, each on its share of the threads (default: as many as there are threads, and as fit
+    /// into the free memory). The results do not depend on their number.
+    #[arg(long, value_name = "RUNS", value_parser = clap::value_parser!(u64).range(1..))]
+    side_by_side: Option<u64>,
     #[command(flatten)]
     pub(crate) compute: Compute,
     /// One line of JSON per run instead of the table.
@@ -119,7 +124,8 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let (device, threads) = (args.compute.device(), args.compute.threads());
     let setup = TrainingSetup { device, threads, revision: revision(), recordings: &locate };
     let mut console = StudyConsole::new(&runs);
-    let mut runner = StudyRunner::new(games, &folder, args.force, setup);
+    let most = args.side_by_side.map(|runs| runs as usize);
+    let mut runner = StudyRunner::new(games, &folder, args.force, setup).side_by_side(most);
     let explained = |error| explain(error, &args.from);
     runner.check_folders(&runs)?;
     runner.check_recordings(&runs, &mut console).map_err(explained)?;
@@ -174,14 +180,28 @@ struct StudyConsole {
     /// Steps of all runs, and of those that have ended.
     steps: u64,
     done: u64,
-    /// Steps of the present run.
-    present: u64,
+    /// The present runs, by their names.
+    present: BTreeMap<String, PresentRun>,
 }
+
+/// A run that goes on.
+struct PresentRun {
+    /// Its place among all, from 1.
+    number: usize,
+    /// Steps of its training, and those that are done.
+    steps: u64,
+    done: u64,
+    /// Its skills, while it learns them.
+    skills: String,
+}
+
+/// Most present runs that are named.
+const MOST_NAMED: usize = 4;
 
 impl StudyConsole {
     fn new(runs: &[StudyRun]) -> Self {
         let steps = runs.iter().map(trained_steps).sum();
-        Self { console: Console::default(), whole: None, runs: runs.len(), steps, done: 0, present: 0 }
+        Self { console: Console::default(), whole: None, runs: runs.len(), steps, done: 0, present: BTreeMap::new() }
     }
 
     fn begin(&mut self) {
@@ -191,6 +211,34 @@ impl StudyConsole {
     fn end(self) {
         self.whole.iter().for_each(ProgressBar::finish_and_clear);
     }
+
+    /// Shows which runs go on, and how far all of them are.
+    fn show(&self) {
+        let Some(whole) = &self.whole else { return };
+        whole.set_position(self.done + self.present.values().map(|run| run.done).sum::<u64>());
+        let mut runs: Vec<&PresentRun> = self.present.values().collect();
+        runs.sort_by_key(|run| run.number);
+        let mut named: Vec<String> =
+            runs.iter().take(MOST_NAMED).map(|run| format!("{}{}", run.number, run.skills)).collect();
+        let more = runs.len().saturating_sub(MOST_NAMED);
+        if more > 0 {
+            named.push(format!("{more} more"));
+        }
+        let runs = if runs.len() == 1 { "run" } else { "runs" };
+        whole.set_message(format!("{runs} {} of {}", named.join(", "), self.runs));
+    }
+
+    fn advance(&mut self, run: &StudyRun, advance: Advance) {
+        if let Some(present) = self.present.get_mut(&run.id()) {
+            match advance {
+                Advance::Skills { batches, of } => {
+                    present.skills = format!(" (skills {} %)", 100 * batches / of.max(1))
+                }
+                Advance::Steps(steps) => (present.done, present.skills) = (steps.min(present.steps), String::new()),
+            }
+        }
+        self.show();
+    }
 }
 
 impl RunObserver for StudyConsole {
@@ -199,23 +247,30 @@ impl RunObserver for StudyConsole {
     }
 
     fn observe(&mut self, event: RunEvent<'_>) {
-        let Some(whole) = &self.whole else { return self.console.observe(event) };
+        let Some(whole) = self.whole.clone() else { return self.console.observe(event) };
         match event {
-            RunEvent::KnownLevels { .. } => whole.suspend(|| self.console.observe(event)),
-            RunEvent::StudyRunBegun { index, run } => {
-                whole.set_message(format!("run {} of {}", index + 1, self.runs));
-                self.console.set_title(run.id());
-                self.present = trained_steps(run);
+            RunEvent::KnownLevels { .. } | RunEvent::OtherModes { .. } | RunEvent::MasksUnknown { .. } => {
+                whole.suspend(|| self.console.observe(event));
             }
+            RunEvent::StudyRunBegun { index, run } => {
+                self.console.set_title(run.id());
+                let present =
+                    PresentRun { number: index + 1, steps: trained_steps(run), done: 0, skills: String::new() };
+                self.present.insert(run.id(), present);
+                self.show();
+            }
+            RunEvent::StudyRunAdvanced { run, done } => self.advance(run, done),
             RunEvent::StudyRunEnded { run, result } => {
-                self.done += self.present;
-                whole.set_position(self.done);
+                self.done += self.present.remove(&run.id()).map_or(0, |run| run.steps);
+                whole.set_position(self.done + self.present.values().map(|run| run.done).sum::<u64>());
                 let test = &result.test;
                 let line = format!("{}: held-out return {:.2} ± {:.2}", run.id(), test.return_mean, test.return_se);
                 whole.suspend(|| report!("{line}"));
             }
             RunEvent::Updated { report, .. } => {
-                whole.set_position(self.done + report.step.min(self.present));
+                // The only run.
+                self.present.values_mut().for_each(|run| run.done = report.step.min(run.steps));
+                self.show();
                 self.console.observe(event);
             }
             other => self.console.observe(other),

@@ -365,6 +365,15 @@ impl Experiment {
         Ok(check_parts(&self.skill_parts(&self.sizes(game)), free_memory())?)
     }
 
+    /// Returns an estimate of the memory that the data of a run take at a time, in bytes.
+    pub fn memory(&self, game: &dyn Game) -> u64 {
+        let sizes = self.sizes(game);
+        let sum = |parts: Vec<MemoryPart>| parts.iter().fold(0, |sum: u64, part| sum.saturating_add(part.bytes));
+        let skills = if self.algorithm.needs_skills() { sum(self.skill_parts(&sizes)) } else { 0 };
+        let training = if self.algorithm.is_trained() { sum(self.training_parts(game, &sizes)) } else { 0 };
+        skills.max(training)
+    }
+
     fn check_memory_within(&self, game: &dyn Game, room: &Room) -> Result<(), ExperimentError> {
         let sizes = self.sizes(game);
         // Skills are learned before, and their moments are dropped.
@@ -374,14 +383,22 @@ impl Experiment {
         if !self.algorithm.is_trained() {
             return Ok(());
         }
-        let arrangement = Arrangement::of_agents(game, self.arenas, self.worlds);
-        let mut parts = vec![MemoryPart::of_worlds(arrangement), self.rollout_part(&sizes)];
-        match self.algorithm.learner() {
-            LearnerKind::Ppo => parts.extend(self.ppo_parts(&sizes)),
-            LearnerKind::Sac => parts.extend(self.sac_parts(&sizes)),
-        }
+        let parts = self.training_parts(game, &sizes);
         check_parts(&parts, room.memory)?;
-        self.check_threads(arrangement, room.threads)
+        self.check_threads(self.arrangement(game), room.threads)
+    }
+
+    fn arrangement(&self, game: &dyn Game) -> Arrangement {
+        Arrangement::of_agents(game, self.arenas, self.worlds)
+    }
+
+    fn training_parts(&self, game: &dyn Game, sizes: &Sizes) -> Vec<MemoryPart> {
+        let mut parts = vec![MemoryPart::of_worlds(self.arrangement(game)), self.rollout_part(sizes)];
+        match self.algorithm.learner() {
+            LearnerKind::Ppo => parts.extend(self.ppo_parts(sizes)),
+            LearnerKind::Sac => parts.extend(self.sac_parts(sizes)),
+        }
+        parts
     }
 
     /// Checks that each World gets a thread of its own, since Worlds wait for one another.

@@ -7,21 +7,23 @@ use crate::{
 };
 use playbot_harness::{
     brief::shell_word,
-    sealed_file::{SealedFileError, read_sealed, write_sealed},
+    sealed_file::{SealedFileError, read_sealed, write_atomically, write_sealed},
 };
+use playbot_learner::HasExitCode;
 use playbot_report::{
     counted,
     number::{UNKNOWN, fixed, mean_and_error},
     statistics::mean_and_sd,
-    whole,
+    to_svg, whole,
 };
 use serde::{Deserialize, Serialize};
 use std::{
     fmt::Write,
     fs,
-    path::Path,
+    path::{Path, PathBuf},
     time::{Duration, Instant},
 };
+use thiserror::Error;
 
 /// The name of the experiment beside the table.
 pub const EXPERIMENT: &str = "experiment.ron";
@@ -245,12 +247,46 @@ struct Cost {
 /// A clock that runs while a run is worked on.
 pub(crate) struct CostClock {
     begun: Instant,
+    meter: Meter,
     cpu: Option<Duration>,
 }
 
+/// Whose time a run is.
+#[derive(Clone, Copy)]
+enum Meter {
+    /// All of the process's.
+    Process,
+    /// That of the thread that reads the clock.
+    Thread,
+    /// So many threads have no other work, however long they wait.
+    Threads(u32),
+}
+
+impl Meter {
+    /// Returns the time so far, where Linux reports it.
+    fn read(self, begun: Instant) -> Option<Duration> {
+        match self {
+            Self::Process => cpu_time("/proc/self/stat"),
+            Self::Thread => cpu_time("/proc/thread-self/stat"),
+            Self::Threads(threads) => Some(begun.elapsed() * threads),
+        }
+    }
+}
+
 impl CostClock {
+    /// Starts the clock of a run that has the process to itself.
     pub(crate) fn start() -> Self {
-        Self { begun: Instant::now(), cpu: cpu_time() }
+        Self::of(Meter::Process)
+    }
+
+    /// Starts the clock of a run on so many threads of a process that works on others, too.
+    pub(crate) fn start_beside_others(threads: usize) -> Self {
+        Self::of(if threads == 1 { Meter::Thread } else { Meter::Threads(threads as u32) })
+    }
+
+    fn of(meter: Meter) -> Self {
+        let begun = Instant::now();
+        Self { begun, meter, cpu: meter.read(begun) }
     }
 
     /// Adds the elapsed time to the cost of the run in `folder`.
@@ -259,7 +295,8 @@ impl CostClock {
     ///
     /// It cannot be written.
     pub(crate) fn note(&self, folder: &Path) -> Result<(), SealedFileError> {
-        let spent = self.cpu.zip(cpu_time()).map(|(before, now)| now.saturating_sub(before).as_secs_f64());
+        let spent =
+            self.cpu.zip(self.meter.read(self.begun)).map(|(before, now)| now.saturating_sub(before).as_secs_f64());
         let before = Cost::of(folder);
         let cost = Cost {
             cpu_s: match before {
@@ -306,7 +343,8 @@ pub(crate) fn cost_table(runs: &[StudyRun], folder: &Path, command: &str, thread
     let cpu = if total.2 { hours(Some(total.0)) } else { format!("at least {}", hours(Some(total.0))) };
     format!(
         "# What the study has cost\n\n```sh\n{command} --threads {threads}\n```\n\n{}\n{cpu} CPU hours in all, {} by the clock, with \
-         {}. A skill model is learned within the first run that needs it.\n",
+         {}. A skill model is learned within the first run that needs it. Hours are those of each run, also where several go on at a \
+         time.\n",
         markdown_table(&["variant", "runs", "environment steps", "CPU hours", "hours"], rows.into_iter()),
         hours(Some(total.1)),
         counted(threads as u64, "thread"),
@@ -317,14 +355,119 @@ fn hours(seconds: Option<f64>) -> String {
     seconds.map_or("–".to_owned(), |seconds| format!("{:.3}", seconds / 3600.0))
 }
 
-/// Returns the time that all processors have spent on this process, where Linux reports it.
-fn cpu_time() -> Option<Duration> {
+/// Returns the time that all processors have spent on the process or thread of this file, where Linux reports it.
+fn cpu_time(stat: &str) -> Option<Duration> {
     // The name in brackets may hold anything.
-    let stat = fs::read_to_string("/proc/self/stat").ok()?;
+    let stat = fs::read_to_string(stat).ok()?;
     let mut fields = stat.rsplit_once(')')?.1.split_ascii_whitespace().skip(11);
     let ticks: u64 = fields.next()?.parse::<u64>().ok()? + fields.next()?.parse::<u64>().ok()?;
     // The kernel counts these in hundredths of a second for every program, whatever its own clock does.
     Some(Duration::from_millis(ticks * 10))
+}
+
+// The files of a study.
+
+/// The file of results.
+pub const RESULTS: &str = "results.json";
+
+const TABLE: &str = "table.md";
+
+/// Failure to write the files of a study.
+#[derive(Debug, Error)]
+pub enum StudyOutputError {
+    /// The experiment cannot be written as text.
+    #[error("cannot write the experiment: {0}")]
+    Experiment(String),
+    /// A file in the place of the experiment was not written by a study.
+    #[error(
+        "{} is not from a study, and the experiment of this one would replace it: rename it, or choose another folder with \
+         --out", .0.display()
+    )]
+    OtherExperiment(PathBuf),
+    /// The results of an earlier study cannot be written as a table.
+    #[error("{file}: {message}")]
+    Results {
+        /// Their file.
+        file: String,
+        /// The problem.
+        message: String,
+    },
+    /// A file cannot be read or written.
+    #[error(transparent)]
+    File(#[from] SealedFileError),
+}
+
+impl HasExitCode for StudyOutputError {
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Experiment(_) | Self::OtherExperiment(_) | Self::Results { .. } => 3,
+            Self::File(error) => error.exit_code(),
+        }
+    }
+}
+
+/// Writes `table.md`, `experiment.ron`, `curves.svg` and `results.json`.
+///
+/// # Errors
+///
+/// A file cannot be written, or an `experiment.ron` that is not a study's is in the folder.
+pub fn write_report(folder: &Path, report: &StudyReport) -> Result<(), StudyOutputError> {
+    let json = report.to_json().map_err(|error| StudyOutputError::Experiment(error.to_string()))?;
+    write_table(folder, report)?;
+    write_atomically(&folder.join("curves.svg"), to_svg(&report.charts()).as_bytes())?;
+    Ok(write_atomically(&folder.join(RESULTS), json.as_bytes())?)
+}
+
+/// Writes `table.md`, and the `experiment.ron` that it links.
+fn write_table(folder: &Path, report: &StudyReport) -> Result<(), StudyOutputError> {
+    check_experiment_file(folder)?;
+    let experiment = report.to_ron(folder).map_err(|error| StudyOutputError::Experiment(error.to_string()))?;
+    write_atomically(&folder.join(EXPERIMENT), experiment.as_bytes())?;
+    Ok(write_atomically(&folder.join(TABLE), report.to_markdown().as_bytes())?)
+}
+
+/// Checks that no `experiment.ron` is in the folder, except for one that a study wrote. Another one may be the very
+/// experiment of the study, or that of a run.
+///
+/// # Errors
+///
+/// [`StudyOutputError::OtherExperiment`].
+pub fn check_experiment_file(folder: &Path) -> Result<(), StudyOutputError> {
+    let path = folder.join(EXPERIMENT);
+    let is_own = fs::read(&path).is_ok_and(|text| text.starts_with(EXPERIMENT_HEAD.as_bytes()));
+    if is_own || !path.exists() { Ok(()) } else { Err(StudyOutputError::OtherExperiment(path)) }
+}
+
+/// Writes `table.md` and `experiment.ron` again from `results.json`. Learning curves are not in there, so `curves.svg`
+/// stays as it is.
+///
+/// # Errors
+///
+/// There are no results, they are damaged, or an `experiment.ron` that is not a study's is in the folder.
+pub fn rewrite_table(folder: &Path) -> Result<(), StudyOutputError> {
+    let path = folder.join(RESULTS);
+    let refused = |message: String| StudyOutputError::Results { file: path.display().to_string(), message };
+    if !path.exists() {
+        let message = "there is no such file: run the study, or name the folder of one that is done";
+        return Err(refused(message.to_owned()));
+    }
+    let (report, _) = read_sealed::<StudyReport>(&path)?;
+    write_table(folder, &report)
+}
+
+/// Writes `cost.md`: the cost of each variant, over its seeds, and the command.
+///
+/// # Errors
+///
+/// It cannot be written.
+pub fn write_cost(
+    folder: &Path,
+    runs: &[StudyRun],
+    runs_folder: &Path,
+    command: &str,
+    threads: usize,
+) -> Result<(), SealedFileError> {
+    write_atomically(&folder.join("cost.md"), cost_table(runs, runs_folder, command, threads).as_bytes())
 }
 
 #[cfg(test)]
@@ -550,5 +693,18 @@ mod tests {
         if cfg!(target_os = "linux") {
             assert!(twice.cpu_s.expect("Linux says it") >= 2.0 * once.cpu_s.expect("Linux says it"));
         }
+    }
+
+    #[test]
+    fn an_experiment_that_no_study_wrote_is_not_replaced() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join(EXPERIMENT);
+        check_experiment_file(folder.path()).expect("none is there");
+        fs::write(&file, "(game: \"mine\")").expect("writable");
+        let error = check_experiment_file(folder.path()).expect_err("it would be lost");
+        assert!(matches!(&error, StudyOutputError::OtherExperiment(path) if *path == file), "{error}");
+        assert_eq!(error.exit_code(), 3);
+        fs::write(&file, format!("{EXPERIMENT_HEAD}`…`\n()")).expect("writable");
+        check_experiment_file(folder.path()).expect("a study's");
     }
 }
