@@ -12,7 +12,7 @@ use bevy_playbot::{
 };
 use playbot_harness::{
     benchmark::{Benchmark, StageClock},
-    game::Game,
+    game::{Game, idle_action},
     games::Games,
     parallel::{default_threads, on_threads},
     prelude::*,
@@ -31,8 +31,8 @@ use std::time::Instant;
 /// all threads together. Idle is the share of the threads' time in which this program did not compute: it waited, or
 /// other programs had the cores. The phases of an update follow one another: Worlds play, their parts are joined,
 /// minibatches are gathered, networks compute products, and the optimiser steps. `sim/` cases play random actions, `train/`
-/// cases learn. `bare/` cases run frames of a game with an adapter alone: what `sim/` takes more is playbot's, and the work
-/// of the game where something happens.
+/// cases learn. `bare/` cases run frames of a game with an adapter alone, and `still/` cases with agents that do nothing: the
+/// difference is what playbot adds.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot bench --list
@@ -175,7 +175,8 @@ fn cases(game: &dyn Game) -> Vec<Case<'_>> {
     let mut cases: Vec<_> = tools.benchmarks().unwrap_or_else(default).into_iter().map(of).collect();
     if let (Some(mode), TickPlacement::Frame) = (game.modes().first(), game.tools().host.placement()) {
         let benchmark = Benchmark::simulate("bare", mode);
-        cases.insert(0, Case { name: format!("bare/{}", game.name()), game, benchmark, measure: bare });
+        let case = |kind, measure| Case { name: format!("{kind}/{}", game.name()), game, benchmark, measure };
+        cases.splice(..0, [case("bare", bare as Measuring), case("still", still)]);
     }
     cases
 }
@@ -228,36 +229,51 @@ impl Measure {
     }
 }
 
-/// Measures frames of the game alone, without agents and without playbot, in as many Worlds as there are arenas. What
-/// `sim/` takes more is playbot's, and the work of the game where somebody plays.
+/// Measures frames of the game alone, without agents and without playbot, in as many Worlds as there are arenas.
 fn bare(game: &dyn Game, _: &str, _: ObservationKind, args: &Args, _: &Games) -> Result<Measure, CliError> {
     let mut worlds: Vec<_> = (0..args.arenas).filter_map(|_| build_bare_world(game)).collect();
     let threads = if worlds.iter().any(is_bound_to_its_thread) { 1 } else { args.threads };
-    let advance = |worlds: &mut [World]| on_threads(worlds, threads, |world| run_bare(world, TICKS)).len();
+    let mut advance = || {
+        on_threads(&mut worlds, threads, |world| run_bare(world, TICKS));
+        Ok(())
+    };
     // The game starts.
-    advance(&mut worlds);
-    let (start, mut steps, busy) = (Instant::now(), 0, busy_s());
-    while steps == 0 || start.elapsed().as_secs_f64() < args.seconds {
-        steps += advance(&mut worlds) as u64 * TICKS;
-    }
-    let seconds = start.elapsed().as_secs_f64();
-    let idle = idle_share(busy_s() - busy, seconds, args.threads);
-    let steps = steps as f64;
+    advance()?;
+    let Advanced { ticks, seconds, idle } = advance_for(args, advance)?;
+    let steps = (ticks * u64::from(args.arenas)) as f64;
     let parts = json!({ "simulate": microseconds(seconds * threads as f64, steps) });
     Ok(Measure { steps_per_s: steps / seconds, parts, idle, update: None })
 }
 
+/// Measures agents that do nothing on the first level. The game's frames are those of [`bare`] until an episode ends: what
+/// they take more is playbot's.
+fn still(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, _: &Games) -> Result<Measure, CliError> {
+    play(game, mode, kind, args, BlindBot::Constant(idle_action(game)), 0)
+}
+
 /// Measures random actions on up to 64 levels, with observations filled every tick.
 fn simulate(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, _: &Games) -> Result<Measure, CliError> {
+    play(game, mode, kind, args, BlindBot::Uniform, 63)
+}
+
+/// Measures a bot on the levels up to `last`.
+fn play(
+    game: &dyn Game,
+    mode: &str,
+    kind: ObservationKind,
+    args: &Args,
+    bot: BlindBot,
+    last: u64,
+) -> Result<Measure, CliError> {
     let observation_config = ObservationConfig { kind, ..ObservationConfig::default() };
     let arrangement = Arrangement::new(game, args.arenas, args.threads as u32);
-    let levels = LevelSplit { mode: mode.to_owned(), first: 0, last: 63 }.within(game);
+    let levels = LevelSplit { mode: mode.to_owned(), first: 0, last }.within(game);
     let mut worlds = Vec::new();
     for first in arrangement.first_agents() {
         let (mut world, agents) = build_observing_world(game, mode, &observation_config, 1, first, arrangement.arenas)?;
         for agent in agents {
             let queue = LevelQueue::Uniform { first: levels.first, last: levels.last };
-            world.entity_mut(agent).insert((Control::Bot, BlindBot::Uniform, queue));
+            world.entity_mut(agent).insert((Control::Bot, bot.clone(), queue));
         }
         worlds.push(world);
     }
@@ -267,18 +283,32 @@ fn simulate(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, _: 
     }
     worlds.iter_mut().for_each(|world| world.insert_resource(StageClock::default()));
     let threads = if worlds.iter().any(is_bound_to_its_thread) { 1 } else { args.threads };
+    let Advanced { ticks, seconds, idle } = advance_for(args, || {
+        on_threads(&mut worlds, threads, |world| world.ticks(TICKS)).into_iter().collect::<Result<(), _>>()?;
+        Ok(())
+    })?;
+    let steps = (ticks * u64::from(arrangement.total())) as f64;
+    Ok(Measure { steps_per_s: steps / seconds, parts: stages(worlds.iter_mut(), steps), idle, update: None })
+}
+
+/// Ticks of each World, and what they took.
+struct Advanced {
+    ticks: u64,
+    seconds: f64,
+    /// Share of the threads' time in which they did nothing.
+    idle: Option<f64>,
+}
+
+/// Advances Worlds by [`TICKS`] again and again, until the time of a case is over. At least once, so that a busy machine has
+/// a figure as well.
+fn advance_for(args: &Args, mut advance: impl FnMut() -> Result<(), CliError>) -> Result<Advanced, CliError> {
     let (start, mut ticks, busy) = (Instant::now(), 0, busy_s());
-    // At least once, so that a busy machine has a figure as well.
     while ticks == 0 || start.elapsed().as_secs_f64() < args.seconds {
-        for done in on_threads(&mut worlds, threads, |world| world.ticks(TICKS)) {
-            done?;
-        }
+        advance()?;
         ticks += TICKS;
     }
-    let steps = (ticks * u64::from(arrangement.total())) as f64;
     let seconds = start.elapsed().as_secs_f64();
-    let idle = idle_share(busy_s() - busy, seconds, args.threads);
-    Ok(Measure { steps_per_s: steps / seconds, parts: stages(worlds.iter_mut(), steps), idle, update: None })
+    Ok(Advanced { ticks, seconds, idle: idle_share(busy_s() - busy, seconds, args.threads) })
 }
 
 /// Measures PPO with 3 epochs and 8 minibatches. State vectors take 256 steps a rollout, pictures 32 and the
