@@ -719,8 +719,12 @@ pub(super) fn mask(world: &mut World) {
                 (None, None) => Ok(vec![true; actions as usize]),
             }
         });
-        if let Some(legal) = legal {
-            world.entity_mut(agent).insert(LegalActions::new(legal));
+        let Some(legal) = legal.map(LegalActions::new) else { continue };
+        match world.get_mut::<LegalActions>(agent) {
+            Some(mut known) => *known = legal,
+            None => {
+                world.entity_mut(agent).insert(legal);
+            }
         }
     }
 }

@@ -14,7 +14,10 @@ use crate::{
     worlds::hash_with_agent,
 };
 use bevy::{
-    ecs::{component::ComponentInfo, system::ReadOnlySystem},
+    ecs::{
+        component::{ComponentInfo, Mutable},
+        system::ReadOnlySystem,
+    },
     prelude::*,
 };
 use bevy_playbot::{
@@ -382,11 +385,19 @@ fn run<Out: 'static>(system: &mut Option<OwnedSystem<Out>>, world: &mut World) -
 }
 
 /// Replaces a component of the agent, or removes it.
-fn note<C: Component>(world: &mut World, agent: Entity, component: Option<C>) {
-    match component {
-        Some(component) => world.entity_mut(agent).insert(component),
-        None => world.entity_mut(agent).remove::<C>(),
-    };
+fn note<C: Component<Mutability = Mutable>>(world: &mut World, agent: Entity, component: Option<C>) {
+    let mut agent = world.entity_mut(agent);
+    match (component, agent.get_mut::<C>()) {
+        // To insert and to remove takes far longer, and this is done in every tick.
+        (Some(component), Some(mut known)) => *known = component,
+        (Some(component), None) => {
+            agent.insert(component);
+        }
+        (None, Some(_)) => {
+            agent.remove::<C>();
+        }
+        (None, None) => {}
+    }
 }
 
 // Reward and end.
@@ -494,7 +505,7 @@ fn judge(world: &mut World, agent: Entity, reward: f32, end: Option<EpisodeEnd>)
 /// matter.
 pub(super) fn of_transforms(world: &World, baseline: &Baseline) -> u64 {
     let mut sum = 0_u64;
-    for entity in baseline.spawned(world) {
+    for entity in baseline.spawned_with::<Transform>(world) {
         let Some(transform) = world.get::<Transform>(entity) else { continue };
         if !baseline.is_placed(world, entity) {
             continue;

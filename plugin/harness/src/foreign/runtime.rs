@@ -7,6 +7,7 @@ use crate::{
 };
 use bevy::{
     ecs::{
+        archetype::Archetype,
         component::ComponentId,
         entity::EntityHashSet,
         resource::IsResource,
@@ -20,7 +21,7 @@ use bevy::{
 };
 use bevy_playbot::{
     action::ActionValue,
-    agent::{Agent, Control},
+    agent::{Agent, AgentOrder, Control},
     engine::system_errors,
     episode::{Episode, EpisodeEnd},
     fault::Faults,
@@ -225,16 +226,14 @@ impl Foreign {
 }
 
 /// Returns the agents of the World that have a controller, in the order of their numbers.
-pub(super) fn active_agents(world: &mut World) -> Vec<Entity> {
-    let mut agents = world.query::<(Entity, &Agent, &Control)>();
-    let active = agents.iter(world).filter(|(_, _, control)| control.is_active());
-    let mut active: Vec<(u32, Entity)> = active.map(|(entity, agent, _)| (agent.index, entity)).collect();
-    active.sort_by_key(|(index, _)| *index);
-    active.into_iter().map(|(_, entity)| entity).collect()
+pub(super) fn active_agents(world: &World) -> Vec<Entity> {
+    let Some(order) = world.get_resource::<AgentOrder>() else { return Vec::new() };
+    let is_active = |&agent: &Entity| world.get::<Control>(agent).is_some_and(|control| control.is_active());
+    order.entities().iter().copied().filter(is_active).collect()
 }
 
 /// Returns the agents of the World that are playing, in the order of their numbers.
-pub(super) fn playing_agents(world: &mut World) -> Vec<Entity> {
+pub(super) fn playing_agents(world: &World) -> Vec<Entity> {
     let mut agents = active_agents(world);
     agents.retain(|&agent| world.get::<Episode>(agent).is_some_and(Episode::is_running));
     agents
@@ -251,7 +250,12 @@ pub(super) fn with_foreign<T>(
     let mut foreign = cell.lock();
     let place = world.get::<AgentPlace>(agent).map_or(0, |place| place.0);
     foreign.asked = place % foreign.agents.len();
-    world.insert_resource(PlayedAgent(foreign.asked));
+    match world.get_resource_mut::<PlayedAgent>() {
+        Some(mut played) => {
+            played.set_if_neq(PlayedAgent(foreign.asked));
+        }
+        None => world.insert_resource(PlayedAgent(foreign.asked)),
+    }
     let result = work(world, &mut foreign);
     let name = foreign.game.description.name;
     match result {
@@ -350,9 +354,22 @@ impl Baseline {
 
     /// Returns all entities that the game has spawned, in the order of their storage.
     pub(super) fn spawned(&self, world: &World) -> Vec<Entity> {
+        self.spawned_in(world, |_| true).collect()
+    }
+
+    /// Returns the entities that the game has spawned with this component.
+    pub(super) fn spawned_with<C: Component>(&self, world: &World) -> impl Iterator<Item = Entity> {
+        let component = world.component_id::<C>();
+        self.spawned_in(world, move |archetype| component.is_some_and(|component| archetype.contains(component)))
+    }
+
+    fn spawned_in(&self, world: &World, is_wanted: impl Fn(&Archetype) -> bool) -> impl Iterator<Item = Entity> {
         let kept: Vec<ComponentId> = self.kept.iter().filter_map(|id| world.components().get_id(*id)).collect();
-        let is_kept = |entity: Entity| kept.iter().any(|&component| world.entity(entity).contains_id(component));
-        all(world).filter(|entity| !self.entities.contains(entity) && !is_kept(*entity)).collect()
+        let is_kept = move |archetype: &Archetype| kept.iter().any(|&component| archetype.contains(component));
+        // Most archetypes are those of resources.
+        let archetypes = world.archetypes().iter().filter(move |of| !of.is_empty() && is_wanted(of) && !is_kept(of));
+        let entities = archetypes.flat_map(|archetype| archetype.entities().iter().map(|entity| entity.id()));
+        entities.filter(|entity| !self.entities.contains(entity))
     }
 
     /// Returns whether the game itself decides when and where an entity appears. Parts of a scene do not count: they
