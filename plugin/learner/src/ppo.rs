@@ -30,7 +30,7 @@ use crate::{
     ppo::{
         batch::{Batch, JoinedRows, minibatches},
         metrics::Has,
-        on_device::{Reports, SentRollout},
+        on_device::{Reports, SentRollout, images_at_a_time},
         schedule::{Schedule, TakenUp},
         step::{UpdateSettings, step_in_parts},
     },
@@ -334,12 +334,13 @@ impl PpoLearner {
         moment: &UpdateSettings<'_>,
     ) -> Result<StepMetrics, LearnError> {
         let start = Instant::now();
-        let sent = SentRollout::send(batch, &self.base.device.plain());
+        let minibatches = minibatches(&self.config, batch.rollout.rows(), rng);
+        let sent = SentRollout::send(batch, minibatches, &self.base.device.plain());
         batch.gathered(start);
         let (mut reports, before) = (Reports::default(), self.adam.steps());
-        for rows in minibatches(&self.config, batch.rollout.rows(), rng) {
-            let minibatch = sent.minibatch(&rows);
-            reports.step(&mut self.nets, &mut self.adam, &minibatch, &self.config, moment)?;
+        let at_a_time = images_at_a_time(batch, &self.nets, moment);
+        for parts in sent.minibatches(at_a_time) {
+            reports.step(&mut self.nets, &mut self.adam, parts, &self.config, moment)?;
         }
         reports.sum(before)
     }

@@ -17,6 +17,7 @@ use std::{
     borrow::Cow,
     collections::BTreeMap,
     iter::Peekable,
+    ops::Add,
     time::{Duration, Instant},
 };
 
@@ -270,7 +271,30 @@ fn update<S: Simd>(
 
 // Adam on the device of the parameters: on a graphics card, without reading anything back.
 
+/// The gradient of a network on its device: all numbers one after the other.
+pub(crate) struct FlatGrads {
+    numbers: Tensor<1>,
+    /// Names and dimensions of the parameters.
+    layout: Vec<(String, Vec<usize>)>,
+}
+
+impl Add for FlatGrads {
+    type Output = Self;
+
+    /// Adds the gradients of the same network for other rows.
+    fn add(self, more: Self) -> Self {
+        Self { numbers: self.numbers + more.numbers, layout: self.layout }
+    }
+}
+
 impl Adam {
+    /// Returns the gradient of every parameter of `network`, on its device; zeros if the loss does not depend on it.
+    pub(crate) fn read_on_device<M: Parameters>(&self, network: &mut M, mut grads: Gradients) -> FlatGrads {
+        let mut read = Flatten { grads: &mut grads, parts: Vec::new(), layout: Vec::new() };
+        network.visit("", &mut read);
+        FlatGrads { numbers: Tensor::cat(read.parts, 0), layout: read.layout }
+    }
+
     /// Does [`Adam::step`] after clipping by the global norm, which is returned, `[1]`. The moments stay on the
     /// network's device.
     ///
@@ -278,15 +302,12 @@ impl Adam {
     pub(crate) fn step_on_device<M: Parameters>(
         &mut self,
         network: &mut M,
-        mut grads: Gradients,
+        grads: FlatGrads,
         lr: f64,
         max_norm: f64,
     ) -> Tensor<1> {
         let start = Instant::now();
-        let mut read = Flatten { grads: &mut grads, parts: Vec::new(), layout: Vec::new() };
-        network.visit("", &mut read);
-        let Flatten { parts, layout, .. } = read;
-        let grad = Tensor::cat(parts, 0);
+        let FlatGrads { numbers: grad, layout } = grads;
         let FlatMoments { m, v, .. } = match self.flat.take() {
             Some(moments) => moments,
             None => FlatMoments::send(&self.moments, layout.clone(), &grad.device()),
@@ -467,6 +488,7 @@ mod tests {
                 let grads = NamedGrads::take(&mut one, "", grads).expect("readable");
                 let (norm, scale) = grads.clip_factor(0.5, 0).expect("finite");
                 host_adam.step(&mut one, "", &grads, 1e-2, scale).expect("fits");
+                let others = adam.read_on_device(&mut other, others);
                 let found = adam.step_on_device(&mut other, others, 1e-2, 0.5);
                 let found = f64::from(host(found).expect("readable")[0]);
                 assert!((found - norm).abs() < 1e-4 * norm, "{kind}: {found} for {norm}");

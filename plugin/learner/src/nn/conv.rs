@@ -132,6 +132,20 @@ impl PackedPixels {
         Self { words: self.words.clone().select(0, rows), sides: self.sides }
     }
 
+    /// Returns images of the same size, one after the other.
+    ///
+    /// # Panics
+    /// If there are none.
+    pub(crate) fn joined(mut parts: Vec<Self>) -> Self {
+        match parts.len() {
+            1 => parts.remove(0),
+            _ => Self {
+                sides: parts[0].sides,
+                words: Tensor::cat(parts.into_iter().map(|part| part.words).collect(), 0),
+            },
+        }
+    }
+
     /// Returns numbers in 0..1, `[n, channels, height, width]`.
     pub(crate) fn numbers(self) -> Tensor<4> {
         let ([n, words], [channels, height, width]) = (self.words.dims(), self.sides);

@@ -178,6 +178,18 @@ impl ImageNet {
         }
     }
 
+    /// Returns the most numbers that a layer makes of an image of `sides` = `[channels, height, width]`, or reads.
+    pub(crate) fn widest(&self, sides: [usize; 3]) -> usize {
+        let [channels, height, width] = sides;
+        let first = match self {
+            // The first convolution leaves height and width as they are.
+            Self::Impala(net) => net.stages.first().map_or(0, |stage| stage.conv.weight.dims()[0]),
+            // The first convolution halves them twice, for 32 channels at most.
+            Self::Nature(_) => 2,
+        };
+        channels.max(first) * height * width
+    }
+
     fn fc(&self) -> &Linear {
         match self {
             Self::Impala(net) => &net.fc,

@@ -1,4 +1,8 @@
-//! An update on a graphics card: the rollout is sent once, and the numbers of all steps are read back together.
+//! An update on a graphics card: the rollout is sent once, with the rows of all minibatches, and the numbers of all steps
+//! are read back together.
+//!
+//! No buffer is larger than [`LARGEST`], since drivers refuse those of two gigabytes and more. So pixels are sent in pieces, and
+//! the gradient of a large minibatch of images is the sum over its parts.
 
 use crate::{
     LearnError, ObsKind, ObsSlice,
@@ -9,16 +13,23 @@ use crate::{
         PpoConfig, PpoNets, StepMetrics,
         batch::Batch,
         objective::{PpoBatch, PpoLoss},
-        step::{Losses, Minibatch, UpdateSettings, augmentation_loss, outputs},
+        step::{HostLoss, Losses, Minibatch, UpdateSettings, augmentation_loss, outputs},
     },
     score::TeacherBatch,
 };
 use burn::tensor::{Device, Int, Tensor, TensorData};
 use playbot_kernels::host_ops::exp;
 
+/// Most bytes of a tensor of images, or of what a network makes of them.
+const LARGEST: usize = 256 << 20;
+
 /// A whole rollout on a device.
 pub(super) struct SentRollout<'a> {
     batch: &'a Batch<'a>,
+    /// The rows of each minibatch, in ascending order.
+    order: Vec<Vec<usize>>,
+    /// The same on the device, one after the other.
+    rows: Tensor<1, Int>,
     states: States,
     left: Option<Tensor<1>>,
     logit_offsets: Option<Tensor<2>>,
@@ -27,18 +38,30 @@ pub(super) struct SentRollout<'a> {
     device: Device,
 }
 
-#[expect(clippy::large_enum_variant, reason = "there is one per update")]
 enum States {
     Joined(Tensor<2>),
-    Images { z: Option<Tensor<2>>, pixels: PackedPixels },
+    /// Pixels in pieces of so many images.
+    Images {
+        z: Option<Tensor<2>>,
+        pixels: Vec<PackedPixels>,
+        piece: usize,
+    },
 }
 
 impl<'a> SentRollout<'a> {
-    pub(super) fn send(batch: &'a Batch<'a>, device: &Device) -> Self {
+    /// Sends a rollout, and the rows of its minibatches.
+    pub(super) fn send(batch: &'a Batch<'a>, minibatches: impl Iterator<Item = Vec<usize>>, device: &Device) -> Self {
         let rollout = batch.rollout;
         let column = |values: &[f32]| vector(values.to_vec(), device);
         let all: Vec<usize> = (0..rollout.rows()).collect();
+        let mut order: Vec<Vec<usize>> = minibatches.collect();
+        // The order within a minibatch means nothing. In this one the images of a piece follow one another.
+        order.iter_mut().for_each(|rows| rows.sort_unstable());
+        let rows: Vec<i32> = order.iter().flatten().map(|&row| row as i32).collect();
+        let shape = [rows.len()];
         Self {
+            rows: Tensor::from_data(TensorData::new(rows, shape), device),
+            order,
             states: States::send(batch, &all, device),
             left: (!rollout.left.is_empty()).then(|| column(&rollout.left)),
             logit_offsets: logit_offsets(&rollout.legal, &all, rollout.choices(), device),
@@ -55,12 +78,33 @@ impl<'a> SentRollout<'a> {
         }
     }
 
-    pub(super) fn minibatch(&self, rows: &[usize]) -> Minibatch {
-        let numbers = rows.iter().map(|&row| row as i32).collect();
-        let at: Tensor<1, Int> = Tensor::from_data(TensorData::new(numbers, [rows.len()]), &self.device);
+    /// Returns each minibatch in parts of equal size, each with its share of the rows.
+    pub(super) fn minibatches<'b>(
+        &'b self,
+        images_at_a_time: Option<usize>,
+    ) -> impl Iterator<Item = Vec<(Minibatch, f64)>> + 'b {
+        let mut first = 0;
+        self.order.iter().map(move |rows| {
+            let at = self.rows.clone().narrow(0, first, rows.len());
+            first += rows.len();
+            let advantages = self.ppo.advantages.clone().select(0, at.clone());
+            let advantages = if self.batch.norm_adv { normalized(advantages) } else { advantages };
+            let parts = rows.len().div_ceil(images_at_a_time.unwrap_or(rows.len()).max(1)).max(1);
+            let size = rows.len().div_ceil(parts);
+            let part = |first: usize| {
+                let n = size.min(rows.len() - first);
+                let of_part = |columns: &Tensor<1>| columns.clone().narrow(0, first, n);
+                let at = if parts == 1 { at.clone() } else { at.clone().narrow(0, first, n) };
+                let advantages = if parts == 1 { advantages.clone() } else { of_part(&advantages) };
+                (self.minibatch(&rows[first..first + n], &at, advantages), n as f64 / rows.len() as f64)
+            };
+            (0..rows.len()).step_by(size.max(1)).map(part).collect()
+        })
+    }
+
+    fn minibatch(&self, rows: &[usize], at: &Tensor<1, Int>, advantages: Tensor<1>) -> Minibatch {
         let column = |values: &Tensor<1>| values.clone().select(0, at.clone());
-        let advantages = column(&self.ppo.advantages);
-        let inputs = self.states.select(&at);
+        let inputs = self.states.select(rows, at);
         Minibatch {
             augmented: self.batch.augmented(&inputs, rows, &self.device),
             inputs,
@@ -72,19 +116,27 @@ impl<'a> SentRollout<'a> {
                     ActionBatch::Continuous(actions) => ActionBatch::Continuous(actions.clone().select(0, at.clone())),
                 },
                 old_log_probs: column(&self.ppo.old_log_probs),
-                advantages: if self.batch.norm_adv { normalized(advantages) } else { advantages },
+                advantages,
                 old_values: column(&self.ppo.old_values),
                 returns: column(&self.ppo.returns),
             },
             teacher: self.teacher.as_ref().zip(self.batch.teacher.as_ref()).map(|((dist, confidence), host)| {
                 TeacherBatch {
-                    dist: dist.select(&at),
+                    dist: dist.select(at),
                     confidence: column(confidence),
                     mean_confidence: host.mean_confidence(rows),
                 }
             }),
         }
     }
+}
+
+/// Returns how many images a network learns from at a time: all of a minibatch if the penalty is no mean over rows.
+pub(super) fn images_at_a_time(batch: &Batch<'_>, nets: &PpoNets, moment: &UpdateSettings<'_>) -> Option<usize> {
+    let ObsKind::Image(shape) = &batch.rollout.obs_kind else { return None };
+    let cnn = nets.actor.cnn.as_ref().filter(|_| HostLoss::is_for(moment))?;
+    let widest = cnn.widest([shape.channels, shape.height, shape.width]) * size_of::<f32>();
+    Some((LARGEST / widest.max(1)).max(1))
 }
 
 /// Normalises advantages as [`crate::ppo::normalize_advantages`] does.
@@ -100,9 +152,13 @@ impl States {
         match (batch.rollout.obs.as_slice(), &batch.rollout.obs_kind) {
             (ObsSlice::Image(pixels), ObsKind::Image(image)) => {
                 let z = &batch.rollout.z;
+                let sides = [image.channels, image.height, image.width];
+                let size = sides.iter().product::<usize>().max(1);
+                let piece = (LARGEST / size).max(1);
                 Self::Images {
                     z: (batch.latent > 0).then(|| matrix(z.clone(), all.len(), batch.latent, device)),
-                    pixels: PackedPixels::send(pixels, [image.channels, image.height, image.width], device),
+                    piece,
+                    pixels: pixels.chunks(piece * size).map(|piece| PackedPixels::send(piece, sides, device)).collect(),
                 }
             }
             _ => match batch.inputs().input(all, device) {
@@ -112,13 +168,26 @@ impl States {
         }
     }
 
-    fn select(&self, rows: &Tensor<1, Int>) -> NetInput {
+    /// Returns these rows, which are `at` on the device.
+    fn select(&self, rows: &[usize], at: &Tensor<1, Int>) -> NetInput {
         match self {
-            Self::Joined(x) => NetInput::Joined(x.clone().select(0, rows.clone())),
-            Self::Images { z, pixels } => NetInput::Images {
-                z: z.as_ref().map(|z| z.clone().select(0, rows.clone())),
-                pixels: pixels.select(rows.clone()).numbers(),
-            },
+            Self::Joined(x) => NetInput::Joined(x.clone().select(0, at.clone())),
+            Self::Images { z, pixels, piece } => {
+                let mut first = 0;
+                let mut found = Vec::new();
+                for (pixels, begin) in pixels.iter().zip((0..).step_by(*piece)) {
+                    let n = rows[first..].partition_point(|&row| row < begin + piece);
+                    if n > 0 {
+                        let at = if n == rows.len() { at.clone() } else { at.clone().narrow(0, first, n) };
+                        found.push(pixels.select(if begin == 0 { at } else { at - begin as i64 }));
+                    }
+                    first += n;
+                }
+                NetInput::Images {
+                    z: z.as_ref().map(|z| z.clone().select(0, at.clone())),
+                    pixels: PackedPixels::joined(found).numbers(),
+                }
+            }
         }
     }
 }
@@ -140,60 +209,41 @@ enum Metric {
 }
 
 impl Reports {
-    /// Does [`crate::ppo::gradient_step`] with all results left on the device.
+    /// Does [`crate::ppo::gradient_step`] on a minibatch in parts, with all results left on the device.
     pub(super) fn step(
         &mut self,
         nets: &mut PpoNets,
         adam: &mut Adam,
-        batch: &Minibatch,
+        parts: Vec<(Minibatch, f64)>,
         config: &PpoConfig,
         moment: &UpdateSettings<'_>,
     ) -> Result<(), LearnError> {
-        use Metric::{Known, OnDevice};
-        let (dist, values) = outputs(nets, &batch.inputs, batch, config, moment)?;
-        let augmentation = augmentation_loss(nets, &dist, &values, batch, config, moment)?;
-        let Losses { ppo, penalty, mut total } = Losses::of(&dist, values, batch, config, moment)?;
-        let PpoLoss { policy_loss, value_loss, entropy, log_ratio } = ppo;
-        let [policy_loss, value_loss, entropy] = [policy_loss, value_loss, entropy].map(Tensor::inner);
-        let (decoder_kl, kl_penalty) = match penalty {
-            Some(penalty) => (OnDevice(penalty.kl.mean().inner()), OnDevice(penalty.term.inner())),
-            None => (Known(0.0), Known(0.0)),
-        };
-        let log_ratio = log_ratio.inner();
-        let moved = exp(log_ratio.clone()) - 1.0;
-        let approx_kl = (moved.clone() - log_ratio).mean();
-        let clip_fraction = moved.abs().greater_elem(config.clip).float().mean();
-        let augmentation_loss = match augmentation {
-            Some(loss) => {
-                total = total + loss.clone() * config.augment_coef;
-                OnDevice(loss.inner())
-            }
-            None => Known(0.0),
-        };
-        let total_loss = total.clone().inner();
-        let grad_norm = adam.step_on_device(nets, total.backward(), moment.lr, config.max_grad_norm);
-        let metrics = StepMetrics {
-            policy_loss: OnDevice(policy_loss),
-            value_loss: OnDevice(value_loss),
-            entropy: OnDevice(entropy),
-            decoder_kl,
-            kl_penalty,
-            total_loss: OnDevice(total_loss),
-            approx_kl: OnDevice(approx_kl),
-            clip_fraction: OnDevice(clip_fraction),
-            confidence: Known(batch.teacher.as_ref().map_or(0.0, |teacher| teacher.mean_confidence)),
-            augmentation_loss,
-            grad_norm: OnDevice(grad_norm),
-        };
-        let mut numbers = Vec::new();
-        self.known.push(metrics.map(|metric| match metric {
-            OnDevice(number) => {
-                numbers.push(number);
-                None
-            }
-            Known(number) => Some(number),
-        }));
-        self.numbers.push(Tensor::cat(numbers, 0));
+        let (mut sums, mut known, mut confidence) = (None, StepMetrics::default(), 0.0);
+        for (part, share) in parts {
+            confidence += part.teacher.as_ref().map_or(0.0, |teacher| teacher.mean_confidence) * share;
+            let (metrics, total) = metrics_and_loss(nets, &part, config, moment)?;
+            let mut numbers = Vec::new();
+            known = metrics.map(|metric| match metric {
+                Metric::OnDevice(number) => {
+                    numbers.push(number);
+                    None
+                }
+                Metric::Known(number) => Some(number),
+            });
+            // A whole minibatch is not multiplied by 1.
+            let total = if share < 1.0 { total * share } else { total };
+            let (numbers, grads) = (Tensor::cat(numbers, 0), adam.read_on_device(nets, total.backward()));
+            sums = Some(match sums {
+                None if share < 1.0 => (numbers * share, grads),
+                None => (numbers, grads),
+                Some((sum, of_grads)) => (sum + numbers * share, of_grads + grads),
+            });
+        }
+        let Some((numbers, grads)) = sums else { return Ok(()) };
+        let grad_norm = adam.step_on_device(nets, grads, moment.lr, config.max_grad_norm);
+        // The norm is the last of the fields.
+        self.numbers.push(Tensor::cat(vec![numbers, grad_norm], 0));
+        self.known.push(StepMetrics { confidence: Some(confidence), grad_norm: None, ..known });
         Ok(())
     }
 
@@ -216,4 +266,48 @@ impl Reports {
         }
         Ok(sum)
     }
+}
+
+/// Computes the loss of some rows, `[1]`, and their metrics but for the norm of the gradient.
+fn metrics_and_loss(
+    nets: &PpoNets,
+    batch: &Minibatch,
+    config: &PpoConfig,
+    moment: &UpdateSettings<'_>,
+) -> Result<(StepMetrics<Metric>, Tensor<1>), LearnError> {
+    use Metric::{Known, OnDevice};
+    let (dist, values) = outputs(nets, &batch.inputs, batch, config, moment)?;
+    let augmentation = augmentation_loss(nets, &dist, &values, batch, config, moment)?;
+    let Losses { ppo, penalty, mut total } = Losses::of(&dist, values, batch, config, moment)?;
+    let PpoLoss { policy_loss, value_loss, entropy, log_ratio } = ppo;
+    let [policy_loss, value_loss, entropy] = [policy_loss, value_loss, entropy].map(Tensor::inner);
+    let (decoder_kl, kl_penalty) = match penalty {
+        Some(penalty) => (OnDevice(penalty.kl.mean().inner()), OnDevice(penalty.term.inner())),
+        None => (Known(0.0), Known(0.0)),
+    };
+    let log_ratio = log_ratio.inner();
+    let moved = exp(log_ratio.clone()) - 1.0;
+    let approx_kl = (moved.clone() - log_ratio).mean();
+    let clip_fraction = moved.abs().greater_elem(config.clip).float().mean();
+    let augmentation_loss = match augmentation {
+        Some(loss) => {
+            total = total + loss.clone() * config.augment_coef;
+            OnDevice(loss.inner())
+        }
+        None => Known(0.0),
+    };
+    let metrics = StepMetrics {
+        policy_loss: OnDevice(policy_loss),
+        value_loss: OnDevice(value_loss),
+        entropy: OnDevice(entropy),
+        decoder_kl,
+        kl_penalty,
+        total_loss: OnDevice(total.clone().inner()),
+        approx_kl: OnDevice(approx_kl),
+        clip_fraction: OnDevice(clip_fraction),
+        confidence: Known(0.0),
+        augmentation_loss,
+        grad_norm: Known(0.0),
+    };
+    Ok((metrics, total))
 }

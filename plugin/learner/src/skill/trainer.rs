@@ -258,7 +258,8 @@ impl SkillTrainer {
             self.adam.step(&mut self.nets, "", &grads, lr, scale)?;
             return Ok(norm as f32);
         }
-        let norm = scalar(self.adam.step_on_device(&mut self.nets, loss.backward(), lr, max_norm))?;
+        let grads = self.adam.read_on_device(&mut self.nets, loss.backward());
+        let norm = scalar(self.adam.step_on_device(&mut self.nets, grads, lr, max_norm))?;
         let lost = || LearnError::NotFinite { tensor: "gradient".to_owned(), steps: Some(steps) };
         norm.is_finite().then_some(norm).ok_or_else(lost)
     }

@@ -2,9 +2,15 @@
 //! suffices.
 
 use crate::{corridor, image_task, score, toy};
+use burn::cubecl::logging::{LaunchObservation, LaunchObserver};
+use playbot_learner::nn::CnnKind;
 use playbot_learner::{
-    DeviceKind, Learner, PolicySpec, PpoConfig, PpoLearner, Rollout, ScoreConfig, SkillModel, SkillTrainer,
-    UpdateMetrics,
+    Actions, DeviceKind, ImageShape, Learner, Observations, PolicySpec, PpoConfig, PpoLearner, Rollout, ScoreConfig,
+    SkillModel, SkillTrainer, UpdateMetrics,
+};
+use std::sync::{
+    Arc,
+    atomic::{AtomicU64, Ordering},
 };
 
 const CARD: DeviceKind = DeviceKind::Wgpu;
@@ -92,4 +98,59 @@ fn skills() {
     let path = folder.path().join("skills.safetensors");
     card.into_model().save(&path).expect("writable");
     SkillModel::load(&path, DeviceKind::Flex).expect("read where it was not made");
+}
+
+/// The kernels that were started.
+#[derive(Default)]
+struct Launches(AtomicU64);
+
+impl LaunchObserver for Launches {
+    fn launched(&self, _: &'static str) {
+        self.0.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+const PICTURE: ImageShape = ImageShape { channels: 3, height: 64, width: 64 };
+
+/// Returns a rollout of random pictures.
+fn pictures(envs: usize, steps: usize) -> Rollout {
+    let rows = envs * steps;
+    let numbers = |n: usize| (0..n).map(|i| (i * 7919 % 97) as f32 / 97.0).collect::<Vec<_>>();
+    Rollout {
+        steps,
+        obs: Observations::Image((0..rows * PICTURE.numbers()).map(|i| (i * 31 % 251) as u8).collect()),
+        actions: Actions::Discrete((0..rows).map(|i| i as u32 % 4).collect()),
+        log_probs: vec![-1.4; rows],
+        values: numbers(rows),
+        rewards: numbers(rows),
+        terminated: vec![false; rows],
+        truncated: vec![false; rows],
+        final_values: vec![f32::NAN; rows],
+        next_values: numbers(envs),
+        ..Rollout::new(envs, PICTURE, 0, &image_task::SPACE)
+    }
+}
+
+/// With fused operations a step of the Nature-CNN takes about 250 kernels and one of IMPALA 460; without, 320 and 610.
+#[test]
+fn a_step_takes_few_kernels() {
+    let rollout = pictures(8, 10);
+    let impala = CnnKind::Impala { channels: vec![4, 8, 8], feature: 64 };
+    for (cnn, most) in [(CnnKind::Nature { feature: 64 }, 280), (impala, 520)] {
+        let counts = [1, 5].map(|minibatches| {
+            let spec = PolicySpec { obs: PICTURE.into(), latent: 0, action_space: image_task::SPACE };
+            let config = PpoConfig { num_steps: 10, minibatches, epochs: 1, cnn: cnn.clone(), ..image_task::config() };
+            let mut learner = PpoLearner::new(config, spec, 1, CARD).expect("good settings");
+            learner.update(&rollout).expect("finite");
+            let launches = Arc::new(Launches::default());
+            let observed = LaunchObservation::new(launches.clone());
+            learner.update(&rollout).expect("finite");
+            drop(observed);
+            launches.0.load(Ordering::Relaxed)
+        });
+        let of_step = (counts[1] - counts[0]) / 4;
+        assert!((10..=most).contains(&of_step), "{cnn:?}: {of_step} kernels in a step");
+        // Beside its steps an update hardly computes.
+        assert!(counts[0] <= of_step + 40, "{cnn:?}: {counts:?} kernels in updates of one step and of five");
+    }
 }
