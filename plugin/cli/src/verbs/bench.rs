@@ -281,14 +281,21 @@ fn play(
         // The first pictures are late: shaders and textures are prepared.
         worlds.iter_mut().try_for_each(|world| world.ticks(10))?;
     }
-    worlds.iter_mut().for_each(|world| world.insert_resource(StageClock::default()));
+    // Agents that do nothing are there to be compared with frames in which no clock is read, either.
+    if matches!(bot, BlindBot::Uniform) {
+        worlds.iter_mut().for_each(|world| world.insert_resource(StageClock::default()));
+    }
     let threads = if worlds.iter().any(is_bound_to_its_thread) { 1 } else { args.threads };
     let Advanced { ticks, seconds, idle } = advance_for(args, || {
         on_threads(&mut worlds, threads, |world| world.ticks(TICKS)).into_iter().collect::<Result<(), _>>()?;
         Ok(())
     })?;
     let steps = (ticks * u64::from(arrangement.total())) as f64;
-    Ok(Measure { steps_per_s: steps / seconds, parts: stages(worlds.iter_mut(), steps), idle, update: None })
+    let parts = match bot {
+        BlindBot::Uniform => stages(worlds.iter_mut(), steps),
+        _ => json!({ "simulate": microseconds(seconds * threads as f64, steps) }),
+    };
+    Ok(Measure { steps_per_s: steps / seconds, parts, idle, update: None })
 }
 
 /// Ticks of each World, and what they took.
