@@ -21,6 +21,13 @@ mod linear;
 mod params;
 mod sample;
 
+pub(crate) use crate::nn::{
+    adam::FlatGrads,
+    conv::PackedPixels,
+    dist::{CategoricalRows, DistRows, GaussianRows, RowTerms},
+    params::{Init, ParamSource, RandomInit, check_loss, finite, moved, path},
+    sample::{categorical_at, unsquashed_action},
+};
 pub use crate::nn::{
     adam::{Adam, AdamConfig},
     conv::{Conv2d, ObsBatch, max_pool},
@@ -34,11 +41,5 @@ pub use crate::nn::{
         LogProbForm, SquashedDraw, SquashedGaussian, argmax, bounded_log_std, categorical_log_prob, gaussian_log_prob,
         sample_categorical, sample_gaussian, squashed_log_prob, unsquashed,
     },
-};
-pub(crate) use crate::nn::{
-    conv::PackedPixels,
-    dist::{CategoricalRows, DistRows, GaussianRows, RowTerms},
-    params::{Init, ParamSource, RandomInit, check_loss, finite, moved, path},
-    sample::{categorical_at, unsquashed_action},
 };
 pub use playbot_kernels::{elementwise::Activation, trunk::grid::window_places};

@@ -320,7 +320,7 @@ impl PpoLearner {
         let device = self.base.device.plain();
         let mut sum = StepMetrics::default();
         for rows in minibatches(&self.config, batch.rollout.rows(), rng) {
-            let parts = batch.parts(&rows, self.nets.actor.cnn.as_ref(), moment.score, &device);
+            let parts = batch.parts(&rows, self.nets.actor.cnn.as_ref(), moment, &device);
             let step = step_in_parts(&mut self.nets, &mut self.adam, parts, &self.config, moment)?;
             sum.add(&step, 1.0);
         }

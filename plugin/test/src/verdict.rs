@@ -59,6 +59,7 @@ use std::{
     collections::BTreeMap,
     fmt,
     fmt::{Display, Formatter},
+    time::Duration,
 };
 
 pub use crate::verdict::{
@@ -145,6 +146,11 @@ impl LevelVerdict {
     /// Returns the level as reports name it: `hard:7`, with its name behind that if it has one.
     pub fn title(&self) -> String {
         self.name.as_ref().map_or_else(|| self.level.clone(), |name| format!("{} {name}", self.level))
+    }
+
+    /// Returns the time in the game. Results of older versions have none, and a file may hold any number.
+    pub(crate) fn time(&self) -> Option<Duration> {
+        self.seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok())
     }
 
     /// Returns whether it was solved, has no finding, and ends as recorded if it was recorded.

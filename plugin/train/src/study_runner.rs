@@ -1,5 +1,5 @@
 //! The runs of a study: skills, training and measurement, each resumed where it was stopped. They go on side by side, with
-//! as few threads each as there are enough runs for: several trainings share a machine better than one can use it.
+//! as few threads each as there are enough runs for: on many cores several trainings use a machine better than one.
 //!
 //! The folder has:
 //!

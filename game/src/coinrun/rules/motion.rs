@@ -86,9 +86,10 @@ pub fn patrol(
     crates: &[Body],
 ) {
     let can_hold = player.vy < 0.0 && player.ay >= 0 && !crates.is_empty();
-    match free_step(enemy, tiles) {
-        Some(x) if !can_hold => enemy.x = x,
-        _ => patrol_in_parts(enemy, player_state, player, tiles, crates, can_hold),
+    let free = if can_hold { None } else { free_step(enemy, tiles) };
+    match free {
+        Some(x) => enemy.x = x,
+        None => patrol_in_parts(enemy, player_state, player, tiles, crates, can_hold),
     }
 }
 

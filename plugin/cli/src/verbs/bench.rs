@@ -282,7 +282,8 @@ fn play(
         worlds.iter_mut().try_for_each(|world| world.ticks(10))?;
     }
     // Agents that do nothing are there to be compared with frames in which no clock is read, either.
-    if matches!(bot, BlindBot::Uniform) {
+    let has_stages = matches!(bot, BlindBot::Uniform);
+    if has_stages {
         worlds.iter_mut().for_each(|world| world.insert_resource(StageClock::default()));
     }
     let threads = if worlds.iter().any(is_bound_to_its_thread) { 1 } else { args.threads };
@@ -291,9 +292,9 @@ fn play(
         Ok(())
     })?;
     let steps = (ticks * u64::from(arrangement.total())) as f64;
-    let parts = match bot {
-        BlindBot::Uniform => stages(worlds.iter_mut(), steps),
-        _ => json!({ "simulate": microseconds(seconds * threads as f64, steps) }),
+    let parts = match has_stages {
+        true => stages(worlds.iter_mut(), steps),
+        false => json!({ "simulate": microseconds(seconds * threads as f64, steps) }),
     };
     Ok(Measure { steps_per_s: steps / seconds, parts, idle, update: None })
 }

@@ -212,10 +212,15 @@ impl StudyConsole {
         self.whole.iter().for_each(ProgressBar::finish_and_clear);
     }
 
+    /// Returns the steps of all runs that are done.
+    fn steps_done(&self) -> u64 {
+        self.done + self.present.values().map(|run| run.done).sum::<u64>()
+    }
+
     /// Shows which runs go on, and how far all of them are.
     fn show(&self) {
         let Some(whole) = &self.whole else { return };
-        whole.set_position(self.done + self.present.values().map(|run| run.done).sum::<u64>());
+        whole.set_position(self.steps_done());
         let mut runs: Vec<&PresentRun> = self.present.values().collect();
         runs.sort_by_key(|run| run.number);
         let mut named: Vec<String> =
@@ -262,7 +267,7 @@ impl RunObserver for StudyConsole {
             RunEvent::StudyRunAdvanced { run, done } => self.advance(run, done),
             RunEvent::StudyRunEnded { run, result } => {
                 self.done += self.present.remove(&run.id()).map_or(0, |run| run.steps);
-                whole.set_position(self.done + self.present.values().map(|run| run.done).sum::<u64>());
+                whole.set_position(self.steps_done());
                 let test = &result.test;
                 let line = format!("{}: held-out return {:.2} ± {:.2}", run.id(), test.return_mean, test.return_se);
                 whole.suspend(|| report!("{line}"));

@@ -3,7 +3,7 @@
 use crate::{
     foreign::{
         ForeignGame,
-        runtime::{ForeignCell, SystemFactory, playing_agents, with_foreign},
+        runtime::{ForeignCell, SystemFactory, note, playing_agents, with_foreign},
     },
     game::InputTools,
 };
@@ -719,12 +719,8 @@ pub(super) fn mask(world: &mut World) {
                 (None, None) => Ok(vec![true; actions as usize]),
             }
         });
-        let Some(legal) = legal.map(LegalActions::new) else { continue };
-        match world.get_mut::<LegalActions>(agent) {
-            Some(mut known) => *known = legal,
-            None => {
-                world.entity_mut(agent).insert(legal);
-            }
+        if let Some(legal) = legal {
+            note(world, agent, Some(LegalActions::new(legal)));
         }
     }
 }

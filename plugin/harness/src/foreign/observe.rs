@@ -7,17 +7,15 @@ use crate::{
         ForeignGame,
         paths::component_of,
         runtime::{
-            Baseline, ForeignCell, OwnedSystem, ReaderFactory, Sensor, SystemFactory, playing_agents, with_foreign,
+            Baseline, ForeignCell, OwnedSystem, ReaderFactory, Sensor, SystemFactory, note, playing_agents,
+            with_foreign,
         },
     },
     game::{GuessedPosition, StateTools},
     worlds::hash_with_agent,
 };
 use bevy::{
-    ecs::{
-        component::{ComponentInfo, Mutable},
-        system::ReadOnlySystem,
-    },
+    ecs::{component::ComponentInfo, system::ReadOnlySystem},
     prelude::*,
 };
 use bevy_playbot::{
@@ -382,22 +380,6 @@ fn read_state_of(world: &mut World, agent: Entity) {
 /// Runs a system of the description, if there is one.
 fn run<Out: 'static>(system: &mut Option<OwnedSystem<Out>>, world: &mut World) -> Result<Option<Out>, String> {
     system.as_mut().map_or(Ok(None), |system| system.run(world))
-}
-
-/// Replaces a component of the agent, or removes it.
-fn note<C: Component<Mutability = Mutable>>(world: &mut World, agent: Entity, component: Option<C>) {
-    let mut agent = world.entity_mut(agent);
-    match (component, agent.get_mut::<C>()) {
-        // To insert and to remove takes far longer, and this is done in every tick.
-        (Some(component), Some(mut known)) => *known = component,
-        (Some(component), None) => {
-            agent.insert(component);
-        }
-        (None, Some(_)) => {
-            agent.remove::<C>();
-        }
-        (None, None) => {}
-    }
 }
 
 // Reward and end.

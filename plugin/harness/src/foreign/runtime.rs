@@ -8,7 +8,7 @@ use crate::{
 use bevy::{
     ecs::{
         archetype::Archetype,
-        component::ComponentId,
+        component::{ComponentId, Mutable},
         entity::EntityHashSet,
         resource::IsResource,
         schedule::InternedScheduleLabel,
@@ -267,6 +267,22 @@ pub(super) fn with_foreign<T>(
     }
 }
 
+/// Replaces a component of the agent, or removes it.
+pub(super) fn note<C: Component<Mutability = Mutable>>(world: &mut World, agent: Entity, component: Option<C>) {
+    let mut agent = world.entity_mut(agent);
+    match (component, agent.get_mut::<C>()) {
+        // To insert and to remove takes far longer, and this is done in every tick.
+        (Some(component), Some(mut known)) => *known = component,
+        (Some(component), None) => {
+            agent.insert(component);
+        }
+        (None, Some(_)) => {
+            agent.remove::<C>();
+        }
+        (None, None) => {}
+    }
+}
+
 /// Reports a fault of the game, and stops its agent.
 fn report(world: &mut World, agent: Entity, game: &str, why: &str) {
     let index = world.get::<Agent>(agent).map_or(0, |agent| agent.index);
@@ -349,7 +365,7 @@ impl Baseline {
             #[cfg(feature = "camera")]
             TypeId::of::<bevy_playbot::camera::SensorCamera>(),
         ];
-        Self { entities: all(world).collect(), kept, scenes: scene_roots(world) }
+        Self { entities: entities_of(world.archetypes().iter()).collect(), kept, scenes: scene_roots(world) }
     }
 
     /// Returns all entities that the game has spawned, in the order of their storage.
@@ -368,8 +384,7 @@ impl Baseline {
         let is_kept = move |archetype: &Archetype| kept.iter().any(|&component| archetype.contains(component));
         // Most archetypes are those of resources.
         let archetypes = world.archetypes().iter().filter(move |of| !of.is_empty() && is_wanted(of) && !is_kept(of));
-        let entities = archetypes.flat_map(|archetype| archetype.entities().iter().map(|entity| entity.id()));
-        entities.filter(|entity| !self.entities.contains(entity))
+        entities_of(archetypes).filter(|entity| !self.entities.contains(entity))
     }
 
     /// Returns whether the game itself decides when and where an entity appears. Parts of a scene do not count: they
@@ -386,8 +401,8 @@ impl Baseline {
     }
 }
 
-fn all(world: &World) -> impl Iterator<Item = Entity> + '_ {
-    let archetypes = world.archetypes().iter();
+/// Returns the entities of some archetypes, in the order of their storage.
+fn entities_of<'w>(archetypes: impl Iterator<Item = &'w Archetype>) -> impl Iterator<Item = Entity> {
     archetypes.flat_map(|archetype| archetype.entities().iter().map(|entity| entity.id()))
 }
 

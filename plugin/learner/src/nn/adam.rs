@@ -278,6 +278,15 @@ pub(crate) struct FlatGrads {
     layout: Vec<(String, Vec<usize>)>,
 }
 
+impl FlatGrads {
+    /// Takes the gradient of every parameter of `network` away from `grads`; zeros if the loss does not depend on it.
+    pub(crate) fn take<M: Parameters>(network: &mut M, mut grads: Gradients) -> Self {
+        let mut read = Flatten { grads: &mut grads, parts: Vec::new(), layout: Vec::new() };
+        network.visit("", &mut read);
+        Self { numbers: Tensor::cat(read.parts, 0), layout: read.layout }
+    }
+}
+
 impl Add for FlatGrads {
     type Output = Self;
 
@@ -288,13 +297,6 @@ impl Add for FlatGrads {
 }
 
 impl Adam {
-    /// Returns the gradient of every parameter of `network`, on its device; zeros if the loss does not depend on it.
-    pub(crate) fn read_on_device<M: Parameters>(&self, network: &mut M, mut grads: Gradients) -> FlatGrads {
-        let mut read = Flatten { grads: &mut grads, parts: Vec::new(), layout: Vec::new() };
-        network.visit("", &mut read);
-        FlatGrads { numbers: Tensor::cat(read.parts, 0), layout: read.layout }
-    }
-
     /// Does [`Adam::step`] after clipping by the global norm, which is returned, `[1]`. The moments stay on the
     /// network's device.
     ///
@@ -488,7 +490,7 @@ mod tests {
                 let grads = NamedGrads::take(&mut one, "", grads).expect("readable");
                 let (norm, scale) = grads.clip_factor(0.5, 0).expect("finite");
                 host_adam.step(&mut one, "", &grads, 1e-2, scale).expect("fits");
-                let others = adam.read_on_device(&mut other, others);
+                let others = FlatGrads::take(&mut other, others);
                 let found = adam.step_on_device(&mut other, others, 1e-2, 0.5);
                 let found = f64::from(host(found).expect("readable")[0]);
                 assert!((found - norm).abs() < 1e-4 * norm, "{kind}: {found} for {norm}");

@@ -10,10 +10,10 @@ use crate::{
     ppo::{
         PpoConfig,
         objective::{PpoBatch, normalize_advantages},
-        step::Minibatch,
+        step::{Minibatch, UpdateSettings},
     },
     rng::{ChaCha8Rng, shuffle},
-    score::{PenaltyForm, ScoreConfig, TeacherOutput},
+    score::TeacherOutput,
 };
 use burn::tensor::Device;
 use std::{
@@ -95,7 +95,7 @@ impl Batch<'_> {
         &'b self,
         rows: &'b [usize],
         cnn: Option<&ImageNet>,
-        score: Option<&ScoreConfig>,
+        moment: &UpdateSettings<'_>,
         device: &'b Device,
     ) -> impl Iterator<Item = (Minibatch, f64)> + 'b {
         let start = Instant::now();
@@ -103,10 +103,9 @@ impl Batch<'_> {
         if self.norm_adv {
             normalize_advantages(&mut advantages);
         }
-        // The other forms of the penalty are no means over rows.
-        let is_mean = score.is_none_or(|score| score.penalty == PenaltyForm::Mean);
         self.gathered(start);
-        let most = cnn.filter(|_| is_mean).map_or(rows.len(), ImageNet::images_at_a_time);
+        // A loss that is no mean over rows has no parts.
+        let most = cnn.filter(|_| moment.has_mean_loss()).map_or(rows.len(), ImageNet::images_at_a_time);
         (0..rows.len()).step_by(most.max(1)).map(move |first| {
             let start = Instant::now();
             let part = first..(first + most).min(rows.len());

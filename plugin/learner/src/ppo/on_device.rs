@@ -7,13 +7,13 @@
 use crate::{
     LearnError, ObsKind, ObsSlice,
     legal::logit_offsets,
-    nn::{ActionBatch, Adam, Dist, PackedPixels, host, matrix, vector},
+    nn::{ActionBatch, Adam, Dist, FlatGrads, PackedPixels, host, matrix, vector},
     policy::NetInput,
     ppo::{
         PpoConfig, PpoNets, StepMetrics,
         batch::Batch,
         objective::{PpoBatch, PpoLoss},
-        step::{HostLoss, Losses, Minibatch, UpdateSettings, augmentation_loss, outputs},
+        step::{Losses, Minibatch, UpdateSettings, augmentation_loss, outputs},
     },
     score::TeacherBatch,
 };
@@ -78,11 +78,12 @@ impl<'a> SentRollout<'a> {
         }
     }
 
-    /// Returns each minibatch in parts of equal size, each with its share of the rows.
+    /// Returns each minibatch in parts of equal size, each with its share of the rows. A part is gathered when it is
+    /// asked for.
     pub(super) fn minibatches<'b>(
         &'b self,
         images_at_a_time: Option<usize>,
-    ) -> impl Iterator<Item = Vec<(Minibatch, f64)>> + 'b {
+    ) -> impl Iterator<Item = impl Iterator<Item = (Minibatch, f64)> + 'b> + 'b {
         let mut first = 0;
         self.order.iter().map(move |rows| {
             let at = self.rows.clone().narrow(0, first, rows.len());
@@ -91,14 +92,16 @@ impl<'a> SentRollout<'a> {
             let advantages = if self.batch.norm_adv { normalized(advantages) } else { advantages };
             let parts = rows.len().div_ceil(images_at_a_time.unwrap_or(rows.len()).max(1)).max(1);
             let size = rows.len().div_ceil(parts);
-            let part = |first: usize| {
+            let part = move |first: usize| {
                 let n = size.min(rows.len() - first);
-                let of_part = |columns: &Tensor<1>| columns.clone().narrow(0, first, n);
-                let at = if parts == 1 { at.clone() } else { at.clone().narrow(0, first, n) };
-                let advantages = if parts == 1 { advantages.clone() } else { of_part(&advantages) };
+                let (at, advantages) = (at.clone(), advantages.clone());
+                let (at, advantages) = match parts {
+                    1 => (at, advantages),
+                    _ => (at.narrow(0, first, n), advantages.narrow(0, first, n)),
+                };
                 (self.minibatch(&rows[first..first + n], &at, advantages), n as f64 / rows.len() as f64)
             };
-            (0..rows.len()).step_by(size.max(1)).map(part).collect()
+            (0..rows.len()).step_by(size.max(1)).map(part)
         })
     }
 
@@ -131,10 +134,10 @@ impl<'a> SentRollout<'a> {
     }
 }
 
-/// Returns how many images a network learns from at a time: all of a minibatch if the penalty is no mean over rows.
+/// Returns how many images a network learns from at a time; `None` for all of a minibatch.
 pub(super) fn images_at_a_time(batch: &Batch<'_>, nets: &PpoNets, moment: &UpdateSettings<'_>) -> Option<usize> {
     let ObsKind::Image(shape) = &batch.rollout.obs_kind else { return None };
-    let cnn = nets.actor.cnn.as_ref().filter(|_| HostLoss::is_for(moment))?;
+    let cnn = nets.actor.cnn.as_ref().filter(|_| moment.has_mean_loss())?;
     let widest = cnn.widest([shape.channels, shape.height, shape.width]) * size_of::<f32>();
     Some((LARGEST / widest.max(1)).max(1))
 }
@@ -214,7 +217,7 @@ impl Reports {
         &mut self,
         nets: &mut PpoNets,
         adam: &mut Adam,
-        parts: Vec<(Minibatch, f64)>,
+        parts: impl Iterator<Item = (Minibatch, f64)>,
         config: &PpoConfig,
         moment: &UpdateSettings<'_>,
     ) -> Result<(), LearnError> {
@@ -232,7 +235,7 @@ impl Reports {
             });
             // A whole minibatch is not multiplied by 1.
             let total = if share < 1.0 { total * share } else { total };
-            let (numbers, grads) = (Tensor::cat(numbers, 0), adam.read_on_device(nets, total.backward()));
+            let (numbers, grads) = (Tensor::cat(numbers, 0), FlatGrads::take(nets, total.backward()));
             sums = Some(match sums {
                 None if share < 1.0 => (numbers * share, grads),
                 None => (numbers, grads),

@@ -131,6 +131,13 @@ pub(super) struct UpdateSettings<'a> {
     pub(super) is_warming_up: bool,
 }
 
+impl UpdateSettings<'_> {
+    /// Returns whether the loss is a mean over rows; it is, except for the penalties of the released code.
+    pub(super) fn has_mean_loss(&self) -> bool {
+        self.score.is_none_or(|score| score.penalty == PenaltyForm::Mean)
+    }
+}
+
 /// Returns the minimised loss, with its metrics.
 fn loss(
     nets: &PpoNets,
@@ -141,7 +148,7 @@ fn loss(
 ) -> Result<(Tensor<1>, StepMetrics), LearnError> {
     let (dist, values) = outputs(nets, &batch.inputs, batch, config, moment)?;
     let augmentation = augmentation_loss(nets, &dist, &values, batch, config, moment)?;
-    let (total, metrics) = if is_host(&values.device()) && HostLoss::is_for(moment) {
+    let (total, metrics) = if is_host(&values.device()) && moment.has_mean_loss() {
         let loss = HostLoss::of(&dist, &values, batch, config, moment, steps)?;
         let metrics = loss.metrics;
         (loss.tensor(&dist, values), metrics)
@@ -264,11 +271,6 @@ struct Piece<'a> {
 }
 
 impl HostLoss {
-    /// Returns whether the loss is a mean over rows; it is, except for the penalties of the released code.
-    pub(super) fn is_for(moment: &UpdateSettings<'_>) -> bool {
-        moment.score.is_none_or(|score| score.penalty == PenaltyForm::Mean)
-    }
-
     /// Computes the loss for the outputs of actor and critic on `batch`, with the mean penalty if there is one.
     ///
     /// # Errors

@@ -5,8 +5,8 @@ use crate::{
     device::update_on,
     file::{FileKind, TensorFile},
     nn::{
-        ActionBatch, Adam, AdamConfig, Dist, NamedGrads, ObsBatch, argmax, check_loss, frozen, host, matrix, scalar,
-        tracked,
+        ActionBatch, Adam, AdamConfig, Dist, FlatGrads, NamedGrads, ObsBatch, argmax, check_loss, frozen, host, matrix,
+        scalar, tracked,
     },
     norm::{ObsStats, put_obs_stats, take_obs_stats},
     observation::augmented,
@@ -258,7 +258,7 @@ impl SkillTrainer {
             self.adam.step(&mut self.nets, "", &grads, lr, scale)?;
             return Ok(norm as f32);
         }
-        let grads = self.adam.read_on_device(&mut self.nets, loss.backward());
+        let grads = FlatGrads::take(&mut self.nets, loss.backward());
         let norm = scalar(self.adam.step_on_device(&mut self.nets, grads, lr, max_norm))?;
         let lost = || LearnError::NotFinite { tensor: "gradient".to_owned(), steps: Some(steps) };
         norm.is_finite().then_some(norm).ok_or_else(lost)

@@ -47,7 +47,7 @@ const MOST_CHANGES: usize = 20;
 /// The folder has no results, they are damaged, the files cannot be written, or [`report_date`] returns an error.
 pub fn write_reports(folder: &Path, comparison: Option<&Comparison>, program: &str) -> Result<Overview, TestError> {
     let overview = Overview::read(folder)?;
-    write_junit(folder, program, report_date()?.as_deref())?;
+    write_junit(folder, &overview, program, report_date()?.as_deref())?;
     write(&folder.join(SUMMARY), &summary(&overview, comparison, program))?;
     if let Some(comparison) = comparison {
         let path = folder.join(AGAINST);

@@ -12,13 +12,13 @@ use std::{
     sync::{
         Condvar, Mutex, MutexGuard, PoisonError,
         atomic::{AtomicBool, Ordering},
-        mpsc::{self, RecvTimeoutError, Sender},
+        mpsc::{self, Receiver, RecvTimeoutError, Sender},
     },
     thread,
     time::Duration,
 };
 
-/// Longest time for which nobody asks whether to stop.
+/// Longest time between two looks at whether to stop.
 const PAUSE: Duration = Duration::from_millis(100);
 
 impl StudyRunner<'_> {
@@ -37,8 +37,7 @@ impl StudyRunner<'_> {
         let files: Vec<_> = files.collect::<Result<_, _>>()?;
         let threads = self.setup.threads / lanes;
         let (waiting, stop) = (Mutex::new((0..runs.len()).collect::<VecDeque<_>>()), AtomicBool::new(false));
-        let mut all: Vec<Option<Result<Ended, StudyRunError>>> = runs.iter().map(|_| None).collect();
-        thread::scope(|scope| {
+        let all = thread::scope(|scope| {
             let (sender, news) = mpsc::channel();
             for _ in 0..lanes {
                 let (mut lane, files, waiting) =
@@ -54,35 +53,12 @@ impl StudyRunner<'_> {
                 });
             }
             drop(sender);
-            loop {
-                match news.recv_timeout(PAUSE) {
-                    Ok((index, News::Ended(ended))) => {
-                        let run = &runs[index];
-                        match &*ended {
-                            Ok(Some((result, _))) => observer.observe(RunEvent::StudyRunEnded { run, result }),
-                            // The others save what they have.
-                            Ok(None) | Err(_) => stop.store(true, Ordering::Relaxed),
-                        }
-                        all[index] = Some(*ended);
-                    }
-                    Ok((index, news)) => news.pass_on(index, &runs[index], observer),
-                    Err(RecvTimeoutError::Timeout) => {}
-                    Err(RecvTimeoutError::Disconnected) => break,
-                }
-                if observer.stopped() {
-                    stop.store(true, Ordering::Relaxed);
-                }
-            }
+            hear(&news, runs, &stop, observer)
         });
-        let mut ended = Vec::new();
-        let mut is_whole = true;
-        for one in all {
-            match one.transpose()?.flatten() {
-                Some(one) => ended.push(one),
-                None => is_whole = false,
-            }
-        }
-        Ok(is_whole.then_some(ended))
+        // An error counts more than the runs that it has stopped.
+        let ended = all.into_iter().map(|one| Ok(one.transpose()?.flatten()));
+        let ended: Vec<Ended> = ended.collect::<Result<_, StudyRunError>>()?;
+        Ok(ended.into_iter().collect())
     }
 
     /// Takes the first waiting run whose skills no other run is learning, or else the first.
@@ -91,6 +67,36 @@ impl StudyRunner<'_> {
         let is_free = |&run: &usize| files[run].as_ref().is_none_or(|file| !self.skills.is_taken(file));
         let place = waiting.iter().position(is_free).unwrap_or(0);
         waiting.remove(place)
+    }
+}
+
+/// Tells the observer what all runs have to say, until the last of them is over, and the runs whether to stop. Returns how
+/// each run ended; `None` for those that never began.
+fn hear(
+    news: &Receiver<(usize, News)>,
+    runs: &[StudyRun],
+    stop: &AtomicBool,
+    observer: &mut dyn RunObserver,
+) -> Vec<Option<Result<Ended, StudyRunError>>> {
+    let mut all: Vec<_> = runs.iter().map(|_| None).collect();
+    loop {
+        match news.recv_timeout(PAUSE) {
+            Ok((index, News::Ended(ended))) => {
+                let run = &runs[index];
+                match &*ended {
+                    Ok(Some((result, _))) => observer.observe(RunEvent::StudyRunEnded { run, result }),
+                    // The others save what they have.
+                    Ok(None) | Err(_) => stop.store(true, Ordering::Relaxed),
+                }
+                all[index] = Some(*ended);
+            }
+            Ok((index, news)) => news.pass_on(index, &runs[index], observer),
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => return all,
+        }
+        if observer.stopped() {
+            stop.store(true, Ordering::Relaxed);
+        }
     }
 }
 
@@ -185,7 +191,7 @@ struct Lane<'a> {
 
 impl Lane<'_> {
     fn tell(&self, news: News) {
-        // Nobody listens only where the program ends.
+        // The receiver is gone only if its thread has panicked, which ends the program.
         let _ = self.news.send((self.run, news));
     }
 }

@@ -11,7 +11,7 @@ use crate::{
         error::{TestError, io_error},
         plan::{TestRecord, TesterRecord},
         reports::{JUNIT, failure, rerun_commands},
-        results::ResultLines,
+        results::{Overview, ResultLines},
     },
 };
 use playbot_harness::level_files::is_level_files;
@@ -55,99 +55,85 @@ fn date(seconds: &OsStr) -> Result<String, TestError> {
 /// Writes the results in a folder to `junit.xml` there, with this date. A level that was not solved, that has a finding, or
 /// that no longer ends as recorded, has failed.
 ///
-/// The results are read twice, since a suite begins with its counts: a million levels take no more memory than one.
-pub(super) fn write_junit(folder: &Path, program: &str, date: Option<&str>) -> Result<(), TestError> {
-    let all = Totals::read(folder)?;
+/// A suite begins with its counts, which are those of `overview`. So a million levels take no more memory than one.
+pub(super) fn write_junit(
+    folder: &Path,
+    overview: &Overview,
+    program: &str,
+    date: Option<&str>,
+) -> Result<(), TestError> {
+    let lines = ResultLines::open(folder)?;
     let path = folder.join(JUNIT);
-    write_atomically_with(&path, |file| write_suites(file, folder, program, date, &all))
+    write_atomically_with(&path, |file| write_suites(file, lines, overview, program, date))
         .map_err(io_error("write", &path))
 }
 
 /// The counts and the time of a suite, or of all.
-#[derive(Default)]
 struct Totals {
     tests: u64,
     failures: u64,
     time: Option<Duration>,
 }
 
-impl Totals {
-    fn read(folder: &Path) -> Result<Self, TestError> {
-        let (mut lines, mut totals) = (ResultLines::open(folder)?, Self::default());
-        while let Some(level) = lines.next_level()? {
-            totals.add(&level);
-        }
-        Ok(totals)
-    }
-
-    fn add(&mut self, level: &LevelVerdict) {
-        self.tests += 1;
-        self.failures += u64::from(!level.is_sound());
-        self.time = [self.time, time(level)].into_iter().flatten().reduce(Duration::saturating_add);
-    }
-}
-
-/// Returns the time of a level in the game. Results of older versions have none, and a file may hold any number.
-fn time(level: &LevelVerdict) -> Option<Duration> {
-    level.seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok())
-}
-
 fn write_suites(
     file: &mut dyn Write,
-    folder: &Path,
+    mut lines: ResultLines,
+    overview: &Overview,
     program: &str,
     date: Option<&str>,
-    all: &Totals,
 ) -> io::Result<()> {
-    let mut lines = ResultLines::open(folder).map_err(io::Error::other)?;
     let record = lines.record().clone();
     let class = class(&record);
+    let all = Totals { tests: overview.levels, failures: overview.unsound, time: overview.time };
     let mut xml = Xml { writer: Writer::new_with_indent(file, b' ', 4) };
     xml.writer.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
-    let name = format!("{} {}", record.game, record.range);
-    let suites = xml.begin("testsuites", |tag| {
-        tag.text("name", &name);
-        tag.text("tests", &all.tests.to_string());
-        tag.text("failures", &all.failures.to_string());
-        tag.text("errors", "0");
-        tag.time(all.time);
-    })?;
-    if is_level_files(&record.range.mode) && all.tests > 0 {
-        while let Some(level) = lines.next_level().map_err(io::Error::other)? {
-            let mut one = Totals::default();
-            one.add(&level);
-            let suite = xml.begin("testsuite", |tag| name_suite(tag, &record, Some(&level.level), date, &one))?;
-            write_case(&mut xml, &record, &level, program, &class)?;
-            xml.end(suite)?;
-        }
-    } else {
-        let suite = xml.begin("testsuite", |tag| name_suite(tag, &record, None, date, all))?;
-        while let Some(level) = lines.next_level().map_err(io::Error::other)? {
-            write_case(&mut xml, &record, &level, program, &class)?;
-        }
-        xml.end(suite)?;
+    let mut suites = Tag::new("testsuites");
+    suites.text("name", &format!("{} {}", record.game, record.range));
+    suites.text("tests", &all.tests.to_string());
+    suites.text("failures", &all.failures.to_string());
+    suites.text("errors", "0");
+    suites.time(all.time);
+    xml.begin(suites)?;
+    let is_file_a_suite = is_level_files(&record.range.mode) && all.tests > 0;
+    if !is_file_a_suite {
+        xml.begin(suite(&record, None, date, &all))?;
     }
-    xml.end(suites)?;
+    while let Some(level) = lines.next_level().map_err(io::Error::other)? {
+        if is_file_a_suite {
+            let one = Totals { tests: 1, failures: u64::from(!level.is_sound()), time: level.time() };
+            xml.begin(suite(&record, Some(&level.level), date, &one))?;
+        }
+        write_case(&mut xml, &record, &level, program, &class)?;
+        if is_file_a_suite {
+            xml.end("testsuite")?;
+        }
+    }
+    if !is_file_a_suite {
+        xml.end("testsuite")?;
+    }
+    xml.end("testsuites")?;
     xml.writer.write_indent()
 }
 
-/// Names the suite of all levels, or that of a level file. Readers that show failures at files read the suite's file,
+/// Returns the suite of all levels, or that of a level file. Readers that show failures at files read the suite's file,
 /// because a case may not have one.
-fn name_suite(tag: &mut Tag, record: &TestRecord, file: Option<&str>, date: Option<&str>, totals: &Totals) {
+fn suite(record: &TestRecord, file: Option<&str>, date: Option<&str>, totals: &Totals) -> Tag {
     let levels = file.map_or_else(|| record.range.to_string(), str::to_owned);
-    tag.text("name", &format!("{} {levels}", record.game));
-    tag.text("tests", &totals.tests.to_string());
-    tag.text("skipped", "0");
-    tag.text("errors", "0");
-    tag.text("failures", &totals.failures.to_string());
-    tag.time(totals.time);
+    let mut suite = Tag::new("testsuite");
+    suite.text("name", &format!("{} {levels}", record.game));
+    suite.text("tests", &totals.tests.to_string());
+    suite.text("skipped", "0");
+    suite.text("errors", "0");
+    suite.text("failures", &totals.failures.to_string());
+    suite.time(totals.time);
     if let Some(date) = date {
-        tag.text("timestamp", date);
+        suite.text("timestamp", date);
     }
-    tag.text("hostname", HOST);
+    suite.text("hostname", HOST);
     if let Some(file) = file {
-        tag.text("file", file);
+        suite.text("file", file);
     }
+    suite
 }
 
 fn write_case(
@@ -157,22 +143,21 @@ fn write_case(
     program: &str,
     class: &str,
 ) -> io::Result<()> {
-    let mut case = Tag(BytesStart::new("testcase"));
+    let mut case = Tag::new("testcase");
     case.text("name", &level.title());
     case.text("classname", class);
-    case.time(time(level));
+    case.time(level.time());
     if level.is_sound() {
         return xml.writer.write_event(Event::Empty(case.0));
     }
-    let end = case.0.to_end().into_owned();
-    xml.writer.write_event(Event::Start(case.0))?;
-    let failed = xml.begin("failure", |tag| {
-        tag.text("message", &failure(level));
-        tag.text("type", kind(level));
-    })?;
+    xml.begin(case)?;
+    let mut failed = Tag::new("failure");
+    failed.text("message", &failure(level));
+    failed.text("type", kind(level));
+    xml.begin(failed)?;
     xml.writer.write_event(Event::Text(BytesText::new(&of_xml(&description(record, level, program)))))?;
-    xml.end(failed)?;
-    xml.writer.write_event(Event::End(end))
+    xml.end("failure")?;
+    xml.end("testcase")
 }
 
 /// An XML file that is being written.
@@ -181,16 +166,12 @@ struct Xml<'a> {
 }
 
 impl Xml<'_> {
-    /// Begins an element with the attributes that `add` gives it, and returns its end.
-    fn begin(&mut self, name: &'static str, add: impl FnOnce(&mut Tag)) -> io::Result<BytesEnd<'static>> {
-        let mut tag = Tag(BytesStart::new(name));
-        add(&mut tag);
-        self.writer.write_event(Event::Start(tag.0))?;
-        Ok(BytesEnd::new(name))
+    fn begin(&mut self, tag: Tag) -> io::Result<()> {
+        self.writer.write_event(Event::Start(tag.0))
     }
 
-    fn end(&mut self, end: BytesEnd<'static>) -> io::Result<()> {
-        self.writer.write_event(Event::End(end))
+    fn end(&mut self, name: &str) -> io::Result<()> {
+        self.writer.write_event(Event::End(BytesEnd::new(name)))
     }
 }
 
@@ -198,6 +179,10 @@ impl Xml<'_> {
 struct Tag(BytesStart<'static>);
 
 impl Tag {
+    fn new(name: &'static str) -> Self {
+        Self(BytesStart::new(name))
+    }
+
     fn text(&mut self, key: &str, value: &str) {
         self.0.push_attribute((key, of_xml(value).as_str()));
     }
@@ -432,7 +417,8 @@ mod tests {
         let (mut folder, _) = TestFolder::open(parent.path(), record, Earlier::Keep).expect("new");
         levels.iter().for_each(|level| folder.keep(level).expect("writable"));
         folder.finish().expect("writable");
-        write_junit(parent.path(), "playbot", date).expect("results");
+        let overview = Overview::read(parent.path()).expect("results");
+        write_junit(parent.path(), &overview, "playbot", date).expect("results");
         let text = fs::read_to_string(parent.path().join(JUNIT)).expect("written");
         check(&text);
         text
