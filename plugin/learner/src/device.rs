@@ -1,7 +1,7 @@
 //! Compute devices: the CPU, or a graphics card in a build that supports it.
 
 use crate::LearnError;
-use burn::tensor::Device;
+use burn::tensor::{Device, TensorData};
 use playbot_kernels::{among_workers::among_awake_workers, host_numbers::is_host};
 use serde::{Deserialize, Serialize};
 use std::{
@@ -214,6 +214,47 @@ fn listen() {
             PLACE.replace(place);
         }));
     });
+}
+
+/// Bytes that learners have moved to graphics cards and back on the calling thread, which is the one that they compute on. The
+/// arguments of kernels are not among them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Traffic {
+    /// Bytes sent to cards.
+    pub sent: u64,
+    /// Bytes read from cards.
+    pub read: u64,
+}
+
+thread_local! {
+    static TRAFFIC: Cell<Traffic> = const { Cell::new(Traffic { sent: 0, read: 0 }) };
+}
+
+impl Traffic {
+    /// Returns those since the thread began.
+    pub fn so_far() -> Self {
+        TRAFFIC.get()
+    }
+
+    /// Counts data that are about to be sent to `device`, and returns them.
+    pub(crate) fn sent(data: TensorData, device: &Device) -> TensorData {
+        Self::count(&data, device, |all| &mut all.sent);
+        data
+    }
+
+    /// Counts data that were read from `device`, and returns them.
+    pub(crate) fn read(data: TensorData, device: &Device) -> TensorData {
+        Self::count(&data, device, |all| &mut all.read);
+        data
+    }
+
+    fn count(data: &TensorData, device: &Device, way: fn(&mut Self) -> &mut u64) {
+        if !is_host(device) {
+            let mut all = TRAFFIC.get();
+            *way(&mut all) += data.as_bytes().len() as u64;
+            TRAFFIC.set(all);
+        }
+    }
 }
 
 /// Runs `work` on `device`. A graphics card that is lost, or out of memory, is an error. Work in host memory is

@@ -62,7 +62,7 @@ mod space;
 pub mod spirl;
 
 pub use crate::{
-    device::{DeviceKind, UnknownDevice},
+    device::{DeviceKind, Traffic, UnknownDevice},
     disk::{write_atomically, write_atomically_with},
     error::{FileError, HasExitCode, LearnError, SettingError, brief_number, io_exit_code},
     file::{BrokenSeal, Unsealed, seal_json, seal_text, unseal_json, unseal_text},

@@ -2,9 +2,10 @@
 
 use crate::{
     LearnError,
+    device::Traffic,
     nn::{
         grads::NamedGrads,
-        params::{ParamVisitor, Parameters, host, vector},
+        params::{ParamVisitor, Parameters, data, host, vector},
     },
 };
 use burn::tensor::{Device, Gradients, Tensor, TensorData};
@@ -160,12 +161,12 @@ impl<'a, I: Iterator<Item = (&'a str, &'a [f32])>> ParamVisitor for Step<'a, I> 
         // Taken out of the network, so that its numbers are changed in place unless they are shared.
         let device = tensor.device().inner();
         let plain = std::mem::replace(tensor, Tensor::empty([0; D], &device)).inner();
-        match plain.try_into_data_as::<f32>() {
+        match data(plain) {
             Ok(mut weights) => {
                 self.error = self.update(name, &mut weights, grad).err();
-                *tensor = Tensor::from_data(weights, &device).autodiff().require_grad();
+                *tensor = Tensor::from_data(Traffic::sent(weights, &device), &device).autodiff().require_grad();
             }
-            Err(error) => self.error = Some(LearnError::Device(error.to_string())),
+            Err(error) => self.error = Some(error),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::{
     ObsKind, Observations,
+    device::Traffic,
     nn::{
         matrix,
         params::{Init, ParamSource, ParamVisitor, Parameters, RandomInit, path},
@@ -124,7 +125,8 @@ impl PackedPixels {
         };
         let words: Vec<i32> = pixels.chunks(size).flat_map(|image| image.chunks(BYTES).map(word)).collect();
         let shape = [pixels.len() / size, size.div_ceil(BYTES)];
-        Self { words: Tensor::from_data(TensorData::new(words, shape), device), sides }
+        let words = Traffic::sent(TensorData::new(words, shape), device);
+        Self { words: Tensor::from_data(words, device), sides }
     }
 
     /// Returns some of the images, which may repeat.
@@ -210,7 +212,8 @@ impl ObsBatch {
             let bytes = &pixels[rows[image] * size..][..size];
             numbers.iter_mut().zip(bytes).for_each(|(x, &byte)| *x = f32::from(byte) / 255.0);
         });
-        Tensor::from_data(TensorData::new(numbers, [rows.len(), channels, height, width]), device)
+        let numbers = TensorData::new(numbers, [rows.len(), channels, height, width]);
+        Tensor::from_data(Traffic::sent(numbers, device), device)
     }
 
     /// Returns the number of observations.

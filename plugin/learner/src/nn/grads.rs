@@ -2,7 +2,7 @@
 
 use crate::{
     LearnError,
-    nn::params::{ParamVisitor, Parameters},
+    nn::params::{ParamVisitor, Parameters, data},
 };
 use burn::tensor::{Gradients, Tensor, TensorData};
 use playbot_kernels::{
@@ -142,7 +142,7 @@ impl ParamVisitor for Reader<'_> {
             Source::Owned(grads) => tensor.grad_remove(grads),
         };
         let values = match grad {
-            Some(grad) => grad.try_into_data_as::<f32>().map_err(|e| LearnError::Device(e.to_string())),
+            Some(grad) => data(grad),
             None => Ok(TensorData::zeros::<f32, _>(tensor.dims())),
         };
         match values {

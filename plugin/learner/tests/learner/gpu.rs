@@ -6,7 +6,7 @@ use burn::cubecl::logging::{LaunchObservation, LaunchObserver};
 use playbot_learner::nn::CnnKind;
 use playbot_learner::{
     Actions, DeviceKind, ImageShape, Learner, Observations, PolicySpec, PpoConfig, PpoLearner, Rollout, ScoreConfig,
-    SkillModel, SkillTrainer, UpdateMetrics,
+    SkillModel, SkillTrainer, Traffic, UpdateMetrics,
 };
 use std::sync::{
     Arc,
@@ -153,4 +153,25 @@ fn a_step_takes_few_kernels() {
         // Beside its steps an update hardly computes.
         assert!(counts[0] <= of_step + 40, "{cnn:?}: {counts:?} kernels in updates of one step and of five");
     }
+}
+
+/// A rollout is sent once and no more, and of each step only the metrics are read. Pixels are sent as bytes.
+#[test]
+fn an_update_moves_few_bytes() {
+    let rollout = pictures(8, 10);
+    let (rows, minibatches, epochs) = (80, 5, 2);
+    let spec = PolicySpec { obs: PICTURE.into(), latent: 0, action_space: image_task::SPACE };
+    let cnn = CnnKind::Nature { feature: 64 };
+    let config = PpoConfig { num_steps: 10, minibatches, epochs, cnn, ..image_task::config() };
+    let mut learner = PpoLearner::new(config, spec, 1, CARD).expect("good settings");
+    learner.update(&rollout).expect("finite");
+    let before = Traffic::so_far();
+    learner.update(&rollout).expect("finite");
+    let now = Traffic::so_far();
+    let (sent, read) = (now.sent - before.sent, now.read - before.read);
+    // Beside its pixels a row has an action of 8 bytes, four numbers of 4, and a place in a minibatch of each epoch.
+    let least = rows * (PICTURE.numbers() + 8 + 4 * 4 + epochs * 4) as u64;
+    assert!((least..=least + 1024).contains(&sent), "{sent} bytes were sent, where a rollout has {least}");
+    let steps = (epochs * minibatches) as u64;
+    assert!((steps * 4..=steps * 64).contains(&read), "{read} bytes were read after {steps} steps");
 }
