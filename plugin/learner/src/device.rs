@@ -1,7 +1,7 @@
 //! Compute devices: the CPU, or a graphics card in a build that supports it.
 
 use crate::LearnError;
-use burn::tensor::{Device, TensorData};
+use burn::tensor::{Device, Element, Tensor, TensorData, kind::Basic};
 use playbot_kernels::{among_workers::among_awake_workers, host_numbers::is_host};
 use serde::{Deserialize, Serialize};
 use std::{
@@ -236,18 +236,6 @@ impl Traffic {
         TRAFFIC.get()
     }
 
-    /// Counts data that are about to be sent to `device`, and returns them.
-    pub(crate) fn sent(data: TensorData, device: &Device) -> TensorData {
-        Self::count(&data, device, |all| &mut all.sent);
-        data
-    }
-
-    /// Counts data that were read from `device`, and returns them.
-    pub(crate) fn read(data: TensorData, device: &Device) -> TensorData {
-        Self::count(&data, device, |all| &mut all.read);
-        data
-    }
-
     fn count(data: &TensorData, device: &Device, way: fn(&mut Self) -> &mut u64) {
         if !is_host(device) {
             let mut all = TRAFFIC.get();
@@ -255,6 +243,20 @@ impl Traffic {
             TRAFFIC.set(all);
         }
     }
+}
+
+/// Makes a tensor of data on `device`.
+pub(crate) fn send<const D: usize, K: Basic>(data: TensorData, device: &Device) -> Tensor<D, K> {
+    Traffic::count(&data, device, |all| &mut all.sent);
+    Tensor::from_data(data, device)
+}
+
+/// Reads the data of a tensor as numbers of type `E`.
+pub(crate) fn read<E: Element, const D: usize, K: Basic>(tensor: Tensor<D, K>) -> Result<TensorData, LearnError> {
+    let device = tensor.device();
+    let data = tensor.try_into_data_as::<E>().map_err(|e| LearnError::Device(e.to_string()))?;
+    Traffic::count(&data, &device, |all| &mut all.read);
+    Ok(data)
 }
 
 /// Runs `work` on `device`. A graphics card that is lost, or out of memory, is an error. Work in host memory is

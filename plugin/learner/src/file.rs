@@ -6,7 +6,7 @@ mod seal;
 
 use crate::{
     FileError, LearnError,
-    device::Traffic,
+    device::send,
     disk::write_atomically,
     file::seal::{Form, digits_of},
     nn::{Adam, Init, ParamSource, ParamVisitor, Parameters, host},
@@ -388,7 +388,7 @@ impl ParamSource for StoredParams<'_> {
     fn param<const D: usize>(&mut self, name: &str, shape: [usize; D], _: Init) -> Result<Tensor<D>, FileError> {
         self.file.product(name, &shape)?;
         let values = self.file.take(name, &shape)?;
-        Ok(Tensor::from_data(Traffic::sent(TensorData::new(values, shape), self.device), self.device))
+        Ok(send(TensorData::new(values, shape), self.device))
     }
 }
 

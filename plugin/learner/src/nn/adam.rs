@@ -2,10 +2,10 @@
 
 use crate::{
     LearnError,
-    device::Traffic,
+    device::{read, send},
     nn::{
         grads::NamedGrads,
-        params::{ParamVisitor, Parameters, data, host, vector},
+        params::{ParamVisitor, Parameters, host, vector},
     },
 };
 use burn::tensor::{Device, Gradients, Tensor, TensorData};
@@ -161,10 +161,10 @@ impl<'a, I: Iterator<Item = (&'a str, &'a [f32])>> ParamVisitor for Step<'a, I> 
         // Taken out of the network, so that its numbers are changed in place unless they are shared.
         let device = tensor.device().inner();
         let plain = std::mem::replace(tensor, Tensor::empty([0; D], &device)).inner();
-        match data(plain) {
+        match read::<f32, _, _>(plain) {
             Ok(mut weights) => {
                 self.error = self.update(name, &mut weights, grad).err();
-                *tensor = Tensor::from_data(Traffic::sent(weights, &device), &device).autodiff().require_grad();
+                *tensor = send(weights, &device).autodiff().require_grad();
             }
             Err(error) => self.error = Some(error),
         }

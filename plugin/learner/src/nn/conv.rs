@@ -2,7 +2,7 @@
 
 use crate::{
     ObsKind, Observations,
-    device::Traffic,
+    device::send,
     nn::{
         matrix,
         params::{Init, ParamSource, ParamVisitor, Parameters, RandomInit, path},
@@ -125,8 +125,7 @@ impl PackedPixels {
         };
         let words: Vec<i32> = pixels.chunks(size).flat_map(|image| image.chunks(BYTES).map(word)).collect();
         let shape = [pixels.len() / size, size.div_ceil(BYTES)];
-        let words = Traffic::sent(TensorData::new(words, shape), device);
-        Self { words: Tensor::from_data(words, device), sides }
+        Self { words: send(TensorData::new(words, shape), device), sides }
     }
 
     /// Returns some of the images, which may repeat.
@@ -212,8 +211,7 @@ impl ObsBatch {
             let bytes = &pixels[rows[image] * size..][..size];
             numbers.iter_mut().zip(bytes).for_each(|(x, &byte)| *x = f32::from(byte) / 255.0);
         });
-        let numbers = TensorData::new(numbers, [rows.len(), channels, height, width]);
-        Tensor::from_data(Traffic::sent(numbers, device), device)
+        send(TensorData::new(numbers, [rows.len(), channels, height, width]), device)
     }
 
     /// Returns the number of observations.

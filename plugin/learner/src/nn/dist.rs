@@ -2,7 +2,7 @@
 
 use crate::{
     Actions, LearnError,
-    device::Traffic,
+    device::{read, send},
     nn::params::{host, matrix},
 };
 use burn::tensor::{Device, Int, Tensor, TensorData, activation::log_softmax};
@@ -54,7 +54,7 @@ impl ActionBatch {
         match actions {
             Actions::Discrete(values) => {
                 let values: Vec<i64> = values.iter().map(|&a| i64::from(a)).collect();
-                Self::Discrete(Tensor::from_data(Traffic::sent(TensorData::new(values, [n, 1]), device), device))
+                Self::Discrete(send(TensorData::new(values, [n, 1]), device))
             }
             Actions::Continuous { dim, values } => Self::Continuous(matrix(values.clone(), n, *dim, device)),
         }
@@ -67,9 +67,8 @@ impl ActionBatch {
     pub(crate) fn to_host(&self) -> Result<Actions, LearnError> {
         Ok(match self {
             Self::Discrete(index) => {
-                let read = index.clone().try_into_data_as::<u32>().map_err(|e| LearnError::Device(e.to_string()))?;
-                let read = Traffic::read(read, &index.device()).try_into_vec();
-                Actions::Discrete(read.map_err(|e| LearnError::Device(e.to_string()))?)
+                let numbers = read::<u32, _, _>(index.clone())?.try_into_vec();
+                Actions::Discrete(numbers.map_err(|e| LearnError::Device(e.to_string()))?)
             }
             Self::Continuous(action) => Actions::Continuous { dim: action.dims()[1], values: host(action.clone())? },
         })

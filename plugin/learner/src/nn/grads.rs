@@ -2,7 +2,8 @@
 
 use crate::{
     LearnError,
-    nn::params::{ParamVisitor, Parameters, data},
+    device::read,
+    nn::params::{ParamVisitor, Parameters},
 };
 use burn::tensor::{Gradients, Tensor, TensorData};
 use playbot_kernels::{
@@ -142,7 +143,7 @@ impl ParamVisitor for Reader<'_> {
             Source::Owned(grads) => tensor.grad_remove(grads),
         };
         let values = match grad {
-            Some(grad) => data(grad),
+            Some(grad) => read::<f32, _, _>(grad),
             None => Ok(TensorData::zeros::<f32, _>(tensor.dims())),
         };
         match values {

@@ -2,7 +2,7 @@
 
 use crate::{
     LearnError,
-    device::Traffic,
+    device::{read, send},
     rng::{normal, unit},
 };
 use burn::tensor::{Device, Tensor, TensorData};
@@ -60,8 +60,8 @@ struct Move<'a>(&'a Device, Option<LearnError>);
 
 impl ParamVisitor for Move<'_> {
     fn visit<const D: usize>(&mut self, _: &str, tensor: &mut Tensor<D>) {
-        match data(tensor.clone().inner()) {
-            Ok(numbers) => *tensor = Tensor::from_data(Traffic::sent(numbers, self.0), self.0),
+        match read::<f32, _, _>(tensor.clone().inner()) {
+            Ok(numbers) => *tensor = send(numbers, self.0),
             Err(error) => self.1 = Some(error),
         }
     }
@@ -142,7 +142,7 @@ impl<R: Rng + ?Sized> ParamSource for RandomInit<'_, R> {
             Init::Orthogonal(gain) => orthogonal(shape[0], shape[1..].iter().product(), gain, self.rng),
             Init::Uniform(bound) => uniform(numbers, bound, self.rng),
         };
-        Ok(Tensor::from_data(Traffic::sent(TensorData::new(values, shape), self.device), self.device))
+        Ok(send(TensorData::new(values, shape), self.device))
     }
 }
 
@@ -200,25 +200,18 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 /// Creates a `[rows, width]` tensor.
 pub fn matrix(values: Vec<f32>, rows: usize, width: usize, device: &Device) -> Tensor<2> {
-    Tensor::from_data(Traffic::sent(TensorData::new(values, [rows, width]), device), device)
+    send(TensorData::new(values, [rows, width]), device)
 }
 
 /// Creates a `[len]` tensor.
 pub fn vector(values: Vec<f32>, device: &Device) -> Tensor<1> {
     let len = values.len();
-    Tensor::from_data(Traffic::sent(TensorData::new(values, [len]), device), device)
-}
-
-/// Returns the numbers of a tensor with its shape.
-pub(crate) fn data<const D: usize>(tensor: Tensor<D>) -> Result<TensorData, LearnError> {
-    let device = tensor.device();
-    let data = tensor.try_into_data_as::<f32>().map_err(|e| LearnError::Device(e.to_string()))?;
-    Ok(Traffic::read(data, &device))
+    send(TensorData::new(values, [len]), device)
 }
 
 /// Returns the numbers of a tensor, row-major.
 pub fn host<const D: usize>(tensor: Tensor<D>) -> Result<Vec<f32>, LearnError> {
-    data(tensor)?.try_into_vec().map_err(|e| LearnError::Device(e.to_string()))
+    read::<f32, _, _>(tensor)?.try_into_vec().map_err(|e| LearnError::Device(e.to_string()))
 }
 
 /// Returns the number of a tensor of one element.

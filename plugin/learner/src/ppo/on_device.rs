@@ -6,7 +6,7 @@
 
 use crate::{
     LearnError, ObsKind, ObsSlice,
-    device::Traffic,
+    device::send,
     legal::logit_offsets,
     nn::{ActionBatch, Adam, Dist, FlatGrads, PackedPixels, host, matrix, vector},
     policy::NetInput,
@@ -61,7 +61,7 @@ impl<'a> SentRollout<'a> {
         let rows: Vec<i32> = order.iter().flatten().map(|&row| row as i32).collect();
         let shape = [rows.len()];
         Self {
-            rows: Tensor::from_data(Traffic::sent(TensorData::new(rows, shape), device), device),
+            rows: send(TensorData::new(rows, shape), device),
             order,
             states: States::send(batch, &all, device),
             left: (!rollout.left.is_empty()).then(|| column(&rollout.left)),
