@@ -347,16 +347,33 @@ fn hash(path: &Path) -> u64 {
 }
 
 #[test]
-fn the_first_updates_of_the_quickstart_have_the_same_bytes_on_every_machine() {
-    for (threads, instructions) in [("1", "widest"), ("2", "avx2")] {
-        let folder = tempfile::tempdir().expect("a folder");
-        let train = ["train", "--algorithm", "ppo", "--steps", "16384", "--threads", threads, "--run", "q"];
-        let mut program = command(folder.path(), &train);
+fn a_short_quickstart_has_the_same_bytes_on_every_machine() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let record = ["record", "coinrun", "--levels", "easy:0..9", "--noise", "0.2", "--out", "few.demo"];
+    ended(folder.path(), &record, 0);
+    let demos = format!("demos={}", folder.path().join("few.demo").display());
+    let short = ["--epochs", "1", "--steps", "16384", "--seeds", "1", "--set", "test=hard:64..67", "--set", &demos];
+    for (threads, instructions) in [("1", "widest"), ("2", "avx2"), ("2", "portable")] {
+        let run = format!("{threads}-{instructions}");
+        let mut program =
+            command(folder.path(), &[&["quickstart", "--threads", threads, "--run", &run], &short[..]].concat());
         program.env("PLAYBOT_INSTRUCTIONS", instructions);
         playbot_shell::ended(program, 0);
-        let files = ["checkpoints/step-000000016384/learner.safetensors", "metrics.jsonl"];
-        let found = files.map(|file| hash(&folder.path().join("q").join(file)));
-        let wanted = [0x626c_0af2_6bb9_793e, 0xa82b_68d7_d9cb_7b37];
+        let files = [
+            "skills.safetensors",
+            "score-ppo/checkpoints/step-000000016384/learner.safetensors",
+            "score-ppo/metrics.jsonl",
+            "ppo/checkpoints/step-000000016384/learner.safetensors",
+            "ppo/metrics.jsonl",
+        ];
+        let found = files.map(|file| hash(&folder.path().join(&run).join(file)));
+        let wanted = [
+            0x0519_6a0f_9220_91f0,
+            0xb839_031f_c187_cd21,
+            0x03c9_719a_193b_afe9,
+            0x626c_0af2_6bb9_793e,
+            0xa82b_68d7_d9cb_7b37,
+        ];
         assert_eq!(found, wanted, "{found:#x?} on {threads} threads, {instructions}");
     }
 }

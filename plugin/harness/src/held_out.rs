@@ -234,16 +234,22 @@ impl<'a> HeldOut<'a> {
 
     /// Adds the levels that play like seen ones to those that are found already.
     fn add_alike(&self, seen: &[LevelSplit], found: &mut BTreeSet<u64>, progress: &(dyn Fn(u64, u64) + Sync)) {
-        let mut left = MOST_PLAYED;
-        if self.split.len() > left {
-            return;
-        }
-        left -= self.split.len();
+        let too_many = |range: &LevelSplit| {
+            tracing::warn!(
+                "{range} are too many levels to play for a comparison with {}: some of these may be no unseen levels; give `{}` \
+                 a `.layout`",
+                self.split,
+                self.game.name()
+            );
+        };
+        let mut left = MOST_PLAYED.saturating_sub(self.split.len());
         let mut by_mode = BTreeMap::<&str, BTreeSet<u64>>::new();
         for range in seen {
             if range.len() <= left {
                 left -= range.len();
                 by_mode.entry(&range.mode).or_default().extend(range.levels());
+            } else {
+                too_many(range);
             }
         }
         let own: Vec<u64> = self.split.levels().filter(|level| !found.contains(level)).collect();
