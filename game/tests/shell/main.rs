@@ -21,4 +21,6 @@ mod traced;
 mod trained_on;
 #[cfg(target_os = "linux")]
 mod unwritable;
+#[cfg(unix)]
+mod watched;
 mod written;

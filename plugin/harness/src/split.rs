@@ -29,6 +29,11 @@ pub struct LevelSplit {
 }
 
 impl LevelSplit {
+    /// Creates the split of a single level.
+    pub fn one(mode: impl Into<String>, level: u64) -> Self {
+        Self { mode: mode.into(), first: level, last: level }
+    }
+
     /// Returns the number of levels, at least 1.
     pub fn len(&self) -> u64 {
         self.last - self.first + 1

@@ -60,7 +60,7 @@ pub use crate::findings::{
 };
 pub(crate) use crate::findings::{
     folder::DAY,
-    play::{detector_of, since_edited},
+    play::{Setting as PlayedSetting, detector_of, play_actions, play_player, since_edited},
 };
 
 /// Newest form of the head that is read and written.

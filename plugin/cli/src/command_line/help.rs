@@ -164,6 +164,22 @@ mod tests {
         all
     }
 
+    /// Returns the words of a line as a shell takes them: quotes keep spaces together.
+    fn shell_words(line: &str) -> Vec<String> {
+        let (mut words, mut word, mut quote) = (Vec::new(), String::new(), None);
+        for letter in line.chars().chain([' ']) {
+            match quote {
+                Some(mark) if letter == mark => quote = None,
+                None if letter == '"' || letter == '\'' => quote = Some(letter),
+                None if letter.is_whitespace() => {
+                    words.extend(Some(std::mem::take(&mut word)).filter(|word| !word.is_empty()))
+                }
+                _ => word.push(letter),
+            }
+        }
+        words
+    }
+
     #[test]
     fn the_help_of_another_program_speaks_of_its_own_game() {
         let all = said_of(&runner());
@@ -175,10 +191,9 @@ mod tests {
             let strange = ["playbot ", "GAME", "MODE", "BOT"].iter().find(|word| line.contains(**word));
             if let Some(example) = line.strip_prefix("  jump") {
                 assert_eq!(strange, None, "{line}");
-                let words = example.split("   ").next().unwrap_or_default().split_whitespace();
-                // As a shell takes them.
-                let words = words.map(|word| word.trim_matches('\''));
-                check_usage(std::iter::once("jump").chain(words)).unwrap_or_else(|error| panic!("{line}\n{error}"));
+                let words = shell_words(example.split("   ").next().unwrap_or_default());
+                let words = std::iter::once("jump".to_owned()).chain(words);
+                check_usage(words).unwrap_or_else(|error| panic!("{line}\n{error}"));
                 examples += 1;
             }
             assert!(!line.contains("`playbot "), "{line}");

@@ -80,7 +80,7 @@ impl Replayed {
 }
 
 /// Plays actions up to their end, to that of the episode, or to the tick in which the watcher saw the finding.
-pub(super) fn play_actions(setting: Setting, actions: &[ActionValue], watcher: Option<Watcher>) -> Replayed {
+pub(crate) fn play_actions(setting: Setting, actions: &[ActionValue], watcher: Option<Watcher>) -> Replayed {
     play_on(setting, watcher, |solo| {
         let action = actions.get(solo.ticks() as usize);
         action.is_some_and(|action| {
@@ -135,7 +135,7 @@ fn play_on(setting: Setting, mut watcher: Option<Watcher>, mut prepare: impl FnM
 /// # Errors
 ///
 /// The player's observation cannot be drawn.
-pub(super) fn play_player(
+pub(crate) fn play_player(
     setting: Setting,
     player: &Player,
     observation_config: &ObservationConfig,
@@ -173,7 +173,7 @@ pub(super) fn play_player(
 
 /// The episode to play.
 #[derive(Clone, Copy)]
-pub(super) struct Setting<'a> {
+pub(crate) struct Setting<'a> {
     pub game: &'a dyn Game,
     pub mode: &'a str,
     pub level: u64,

@@ -1,0 +1,411 @@
+//! `playbot watch`.
+//!
+//! The folder, in reading order:
+//!
+//! - `changes`: files that are saved, and when they are whole.
+//! - `saves`: what was found after each save, on disk and in words.
+//! - `solutions`: the actions that solved each level.
+//! - `rebuilt`: levels that only another process of the program can test.
+//! - `page`: the page, and the server that shows it.
+
+mod changes;
+mod page;
+mod rebuilt;
+mod saves;
+mod solutions;
+
+use crate::{
+    arguments::{Compute, at_least_one_step, default_tested, report_agents_along},
+    error::{CliError, Outcome},
+    output::{print_line, program},
+    progress::interrupt,
+    verbs::{
+        test::{DetectorArgs, TesterArgs, list_detectors},
+        watch::{
+            changes::{Edited, LevelFiles, Stamp},
+            page::Page,
+            rebuilt::{Rebuilt, Sources},
+            saves::{LevelState, Save, Saves},
+            solutions::Solutions,
+        },
+    },
+};
+use playbot_harness::{
+    game::{Game, read_level_designs},
+    games::Games,
+    level_files::{is_level_files, level_files_mode},
+    split::LevelSplit,
+};
+use playbot_report::counted;
+use playbot_test::{
+    quick::{QuickPlan, QuickVerdict, judge_quickly},
+    verdict::{LevelOutcome, maps::level_name},
+};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::PathBuf,
+    thread,
+    time::{Duration, Instant},
+};
+
+/// Time between two looks for saved files.
+pub(crate) const GLANCE: Duration = Duration::from_millis(40);
+
+/// Time in which a file that is no level may become one: editors write large files in several pieces.
+const PATIENCE: Duration = Duration::from_millis(400);
+
+/// The port of the page, unless another is named.
+const PORT: u16 = 7788;
+
+/// Watch levels while they are drawn: on each save, test what has changed and show it on a page.
+///
+/// The quickest testers come first: the actions that solved the level before, bots, and an explorer if none of them solves
+/// it. The terminal and a page on this machine show the verdict, the way that solves the level, or the places that nobody
+/// reaches, and what is new since the save before. The page is at http://127.0.0.1:7788, brings itself up to date, and
+/// goes back to any save.
+///
+/// Level files are read again when they are saved. Other levels are tested again by a new process of the program: when a
+/// file of --assets was saved, as a level editor does, and with --rebuild when one of --code was.
+///
+/// With --once all levels are tested once. Exit code 1 if one of them is unsolved or has a finding.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot watch GAME --levels \"files:levels/**/*.json\"
+  playbot watch GAME --levels MODE:0..9 --rebuild \"cargo build --release\"
+  playbot watch GAME --levels \"files:levels/*.json\" --bot BOT,random --port 9000
+  playbot watch GAME --levels \"files:levels/*.json\" --once --json")]
+pub struct Args {
+    /// Name of the game.
+    game: Option<String>,
+    /// Levels, as files:pattern, as mode:first..last, both included, or by their names in a level editor (default: those
+    /// that `test` takes).
+    #[arg(long, visible_alias = "level")]
+    levels: Option<LevelSplit>,
+    #[command(flatten)]
+    testers: TesterArgs,
+    #[command(flatten)]
+    detectors: DetectorArgs,
+    /// Environment steps of the explorer, which plays levels that no other tester solves.
+    #[arg(long, default_value_t = 60_000, value_parser = at_least_one_step)]
+    steps: u64,
+    /// Command that builds the program again when its code was saved. It runs in a shell.
+    #[arg(long, value_name = "COMMAND", conflicts_with = "once")]
+    rebuild: Option<String>,
+    /// Folder or file that --rebuild depends on (repeatable).
+    #[arg(long, value_name = "PATH", default_value = "src", conflicts_with = "once")]
+    code: Vec<PathBuf>,
+    /// Folder or file that the levels of the game depend on (repeatable).
+    #[arg(long, value_name = "PATH", default_value = "assets", conflicts_with = "once")]
+    assets: Vec<PathBuf>,
+    /// Port of the page; 0 takes any.
+    #[arg(long, conflicts_with = "once")]
+    port: Option<u16>,
+    /// Folder that keeps the saves and the solutions.
+    #[arg(long, value_name = "DIR", default_value = "runs/watch")]
+    out: PathBuf,
+    /// Test all levels once, without a page.
+    #[arg(long)]
+    once: bool,
+    /// Leave out levels of these layouts, separated by commas: they were tested already.
+    #[arg(long, value_name = "HASH", value_delimiter = ',', hide = true, requires = "once")]
+    known: Option<Vec<String>>,
+    #[command(flatten)]
+    pub(crate) compute: Compute,
+    /// Print one line of JSON per level, with its picture, instead of words.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
+    let only = games.iter().map(|game| game.name()).next().filter(|_| games.iter().count() == 1);
+    let Some(name) = args.game.as_deref().or(only) else {
+        let names: Vec<&str> = games.iter().map(|game| game.name()).collect();
+        return Err(CliError::Usage(format!("name the game to watch ({})", names.join(", "))));
+    };
+    let game = games.get(name)?;
+    if args.detectors.list_detectors {
+        return list_detectors(game, args.json);
+    }
+    report_agents_along(game);
+    let split = args.levels.clone().unwrap_or_else(|| {
+        let default = default_tested(game);
+        report!("no --levels are named: {default}");
+        default
+    });
+    let is_files = is_level_files(&split.mode);
+    if !is_files {
+        split.check(game)?;
+    }
+    let known = if is_files { default_tested(game) } else { split.clone() };
+    let plan = QuickPlan {
+        testers: args.testers.load(game, &known, args.compute.device())?,
+        detectors: args.detectors.choose(game, &known)?,
+        steps: args.steps,
+        threads: args.compute.threads(),
+    };
+    let (saves, message) = Saves::open(&args.out)?;
+    message.iter().for_each(|message| report!("warning: {message}"));
+    let page = if args.once { None } else { Some(Page::open(args.port, PORT, game.name(), saves.all())?) };
+    if let Some(page) = &page {
+        report!(
+            "{} is at {}",
+            if page.is_other { "the port is taken, so the page" } else { "the page" },
+            page.address()
+        );
+    }
+    interrupt::leave(format!("all saves so far are kept in {}", args.out.display()));
+    interrupt::listen();
+    let solutions = Solutions::new(game, &args.out);
+    let mut watch = Watch { game, plan, saves, solutions, page, json: args.json };
+    match (is_files, args.once) {
+        (true, false) => watch.files(&LevelFiles::new(&split)?),
+        (true, true) => {
+            let files = LevelFiles::new(&split)?;
+            let paths: Vec<String> = files.look().0.into_keys().collect();
+            watch.once(paths.into_iter().map(|path| (LevelSplit::one(level_files_mode(&path), 0), path)), None)
+        }
+        (false, true) => {
+            let levels = split.levels().map(|level| LevelSplit::one(split.mode.clone(), level));
+            let named = levels.map(|level| (level.clone(), title(game, &level)));
+            watch.once(named, args.known.as_deref())
+        }
+        (false, false) => {
+            let sources = Sources::new(&args.code, &args.assets, args.rebuild.clone())?;
+            watch.rebuilt(&Rebuilt::new(&split, &args.out), &sources)
+        }
+    }
+}
+
+/// Returns the level as results name it, with its name in an editor.
+fn title(game: &dyn Game, level: &LevelSplit) -> String {
+    let own = level_name(game, level, level.first);
+    match game.tools().levels.level_name(&level.mode, level.first) {
+        Some(name) => format!("{own} {name}"),
+        None => own,
+    }
+}
+
+/// A watch that goes on until Ctrl-C.
+struct Watch<'a> {
+    game: &'a dyn Game,
+    plan: QuickPlan,
+    saves: Saves,
+    solutions: Solutions<'a>,
+    page: Option<Page>,
+    json: bool,
+}
+
+impl Watch<'_> {
+    /// Watches level files.
+    fn files(&mut self, files: &LevelFiles) -> Result<Outcome, CliError> {
+        let mut known: BTreeMap<String, Stamp> = BTreeMap::new();
+        // The hash of each level when it was tested last.
+        let mut tested: BTreeMap<String, u64> = BTreeMap::new();
+        let mut due: BTreeMap<String, Instant> = BTreeMap::new();
+        let mut is_gone = false;
+        while !interrupt::asked() {
+            let (now, problem) = files.look();
+            if problem.is_some() != is_gone {
+                is_gone = problem.is_some();
+                match &problem {
+                    Some(problem) => report!("{problem}: waiting until there are some again"),
+                    None => report!("there are level files again"),
+                }
+            }
+            for (path, stamp) in &now {
+                if known.get(path) != Some(stamp) {
+                    due.insert(path.clone(), Instant::now());
+                }
+            }
+            let gone: Vec<String> = known.keys().filter(|path| !now.contains_key(*path)).cloned().collect();
+            for path in &gone {
+                due.remove(path);
+                tested.remove(path);
+            }
+            known = now;
+            let mut save = Save::new(self.saves.next());
+            if !gone.is_empty() {
+                save.gone = gone;
+                self.publish(&save);
+            }
+            let paths: Vec<(String, Instant)> = due.iter().map(|(path, since)| (path.clone(), *since)).collect();
+            for (path, since) in paths {
+                if interrupt::asked() {
+                    break;
+                }
+                let split = LevelSplit::one(level_files_mode(&path), 0);
+                match read_level_designs(self.game, &split.mode) {
+                    // It may be half of a level.
+                    Err(_) if since.elapsed() < PATIENCE => continue,
+                    Err(error) => {
+                        due.remove(&path);
+                        tested.remove(&path);
+                        let state = LevelState::unreadable(&path, error.to_string());
+                        self.note(&mut save, state)?;
+                    }
+                    Ok(designs) => {
+                        due.remove(&path);
+                        let hash = designs.hash(0);
+                        if hash.is_some() && tested.get(&path).copied() == hash {
+                            continue;
+                        }
+                        let edited = Edited::new(&path, known.get(&path).copied());
+                        if self.level(&mut save, &split, &path, &|| interrupt::asked() || edited.is_again())? {
+                            tested.extend(hash.map(|hash| (path, hash)));
+                        }
+                    }
+                }
+            }
+            if !save.is_empty() {
+                self.saves.add(save)?;
+            }
+            if !interrupt::asked() {
+                thread::park_timeout(GLANCE);
+            }
+        }
+        self.stopped()
+    }
+
+    /// Watches levels that only a new process can test.
+    fn rebuilt(&mut self, levels: &Rebuilt, sources: &Sources) -> Result<Outcome, CliError> {
+        let mut seen = sources.look();
+        let mut tested = BTreeSet::new();
+        let mut is_due = true;
+        let mut build = false;
+        loop {
+            if is_due {
+                let mut save = Save::new(self.saves.next());
+                if build {
+                    tested.clear();
+                }
+                if let Some(problem) = sources.rebuild(build, &interrupt::asked) {
+                    report!("{problem}");
+                    save.problem = Some(problem);
+                    self.publish(&save);
+                } else {
+                    let mut found = BTreeSet::new();
+                    levels.test(&tested, &interrupt::asked, &mut |state| {
+                        found.extend(state.layout.clone());
+                        self.note(&mut save, state)
+                    })?;
+                    tested.extend(found);
+                }
+                if !save.is_empty() {
+                    self.saves.add(save)?;
+                }
+            }
+            if interrupt::asked() {
+                return self.stopped();
+            }
+            thread::park_timeout(GLANCE);
+            let now = sources.look();
+            // Some programs save several files, one after the other.
+            (is_due, build) = (now != seen, now.code != seen.code);
+            seen = now;
+        }
+    }
+
+    /// Tests levels once, but for those of a known layout. If these are given, a watch that goes on keeps the save.
+    fn once(
+        &mut self,
+        levels: impl Iterator<Item = (LevelSplit, String)>,
+        known: Option<&[String]>,
+    ) -> Result<Outcome, CliError> {
+        let mut save = Save::new(self.saves.next());
+        for (split, name) in levels {
+            if interrupt::asked() {
+                return self.stopped();
+            }
+            let layout = self.game.layout(&split.mode, split.first).map(|layout| format!("{layout:016x}"));
+            if layout.as_ref().is_some_and(|layout| known.is_some_and(|known| known.contains(layout))) {
+                continue;
+            }
+            if is_level_files(&split.mode)
+                && let Err(error) = read_level_designs(self.game, &split.mode)
+            {
+                self.note(&mut save, LevelState::unreadable(&name, error.to_string()))?;
+                continue;
+            }
+            self.level(&mut save, &split, &name, &interrupt::asked)?;
+        }
+        let is_sound = save.levels.iter().all(LevelState::is_sound);
+        if known.is_none() {
+            self.saves.add(save)?;
+        }
+        Ok(if is_sound { Outcome::Pass } else { Outcome::Findings })
+    }
+
+    /// Tests a level, and notes what is found. Returns false if it was stopped.
+    fn level(
+        &mut self,
+        save: &mut Save,
+        split: &LevelSplit,
+        name: &str,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Result<bool, CliError> {
+        let begin = Instant::now();
+        let before = self.saves.last(name);
+        let solution = self.solutions.of(name);
+        let layout = self.game.layout(&split.mode, split.first).map(|layout| format!("{layout:016x}"));
+        let state = |verdict: &QuickVerdict| LevelState {
+            level: name.to_owned(),
+            seconds: begin.elapsed().as_secs_f64(),
+            verdict: verdict.clone(),
+            before: before.clone(),
+            problem: None,
+            layout: layout.clone(),
+        };
+        let page = self.page.as_ref();
+        let mut partial = save.clone();
+        let mut progress = |verdict: &QuickVerdict| {
+            if let Some(page) = page {
+                partial.put(state(verdict));
+                page.publish(&partial);
+            }
+        };
+        let judged = judge_quickly(self.game, &self.plan, split, solution.as_deref(), &mut progress, stop)?;
+        let Some(judged) = judged else { return Ok(false) };
+        let state = state(&judged.verdict);
+        if let Some(actions) = &judged.solution {
+            self.solutions.keep(name, split, actions)?;
+        }
+        self.note(save, state)?;
+        Ok(true)
+    }
+
+    /// Prints what is known of a level, and shows it on the page.
+    fn note(&mut self, save: &mut Save, state: LevelState) -> Result<(), CliError> {
+        if self.json {
+            let text = serde_json::to_string(&state);
+            print_line(text.map_err(|error| CliError::Io(format!("a verdict cannot be written as JSON: {error}")))?)?;
+        } else {
+            print_line(state.to_string())?;
+        }
+        save.put(state);
+        self.publish(save);
+        Ok(())
+    }
+
+    fn publish(&self, save: &Save) {
+        if let Some(page) = &self.page {
+            page.publish(save);
+        }
+    }
+
+    fn stopped(&self) -> Result<Outcome, CliError> {
+        let saves = counted(self.saves.all().len() as u64, "save");
+        report!(
+            "stopped; {saves} kept in {}: `{} watch` goes on from there",
+            self.saves.folder().display(),
+            program::name()
+        );
+        Ok(Outcome::Stopped)
+    }
+}
+
+impl LevelState {
+    /// Returns whether the level is solved and nothing was found.
+    fn is_sound(&self) -> bool {
+        self.problem.is_none() && self.verdict.outcome == Some(LevelOutcome::Solved) && self.verdict.findings.is_empty()
+    }
+}

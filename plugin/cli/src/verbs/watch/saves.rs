@@ -1,0 +1,305 @@
+//! The saves of a watch, and what was found after each: in memory, on disk, and in words.
+
+use crate::{error::CliError, verbs::watch::changes::Stamp};
+use playbot_learner::{disk, disk::DiskFile};
+use playbot_report::{counted, ticks};
+use playbot_test::{quick::QuickVerdict, verdict::LevelOutcome};
+use serde::{Deserialize, Serialize};
+use std::{
+    fmt,
+    fs::OpenOptions,
+    io::Write,
+    path::{Path, PathBuf},
+    time::{SystemTime, UNIX_EPOCH},
+};
+
+/// Name of the file that keeps the saves, one line of JSON each.
+const SAVES: &str = "saves.jsonl";
+
+/// Most saves that are kept: the newest.
+const MOST: usize = 200;
+
+/// A save, and what was found after it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Save {
+    /// Its number, from 1.
+    pub number: u64,
+    /// Its time, in milliseconds since 1970.
+    pub at: u64,
+    /// The levels that were tested.
+    pub levels: Vec<LevelState>,
+    /// The levels that are no longer there.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub gone: Vec<String>,
+    /// What kept all levels from being tested.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub problem: Option<String>,
+}
+
+/// A level after a save.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct LevelState {
+    /// Path of its file, or mode and number, with its name in a level editor.
+    pub level: String,
+    /// Seconds from the begin of its test.
+    pub seconds: f64,
+    /// The verdict.
+    pub verdict: QuickVerdict,
+    /// The verdict of the save before in which it was tested.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub before: Option<Before>,
+    /// Why it could not be tested.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub problem: Option<String>,
+    /// Hash of its layout, if it has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub layout: Option<String>,
+}
+
+/// An earlier verdict, in numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Before {
+    /// The outcome.
+    pub outcome: Option<LevelOutcome>,
+    /// Ticks of the shortest solution.
+    pub ticks: Option<u32>,
+    /// Episodes that were lost.
+    pub lost: u64,
+}
+
+impl Save {
+    /// Begins the save with this number now.
+    pub fn new(number: u64) -> Self {
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        Self { number, at: u64::try_from(now.as_millis()).unwrap_or(0), ..Self::default() }
+    }
+
+    /// Adds a level, or replaces what was known of it.
+    pub fn put(&mut self, state: LevelState) {
+        match self.levels.iter_mut().find(|known| known.level == state.level) {
+            Some(known) => *known = state,
+            None => self.levels.push(state),
+        }
+    }
+
+    /// Returns whether nothing was found.
+    pub fn is_empty(&self) -> bool {
+        self.levels.is_empty() && self.gone.is_empty() && self.problem.is_none()
+    }
+}
+
+impl LevelState {
+    /// Describes a level that cannot be read.
+    pub fn unreadable(level: &str, problem: String) -> Self {
+        let verdict = QuickVerdict { is_final: true, ..QuickVerdict::default() };
+        Self { level: level.to_owned(), seconds: 0.0, verdict, before: None, problem: Some(problem), layout: None }
+    }
+}
+
+impl fmt::Display for LevelState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { level, verdict, before, problem, seconds, .. } = self;
+        if let Some(problem) = problem {
+            return write!(f, "{level}: NOT TESTED: {problem}");
+        }
+        let by = verdict.solved_by.as_deref().unwrap_or("nobody");
+        match (verdict.outcome, verdict.ticks) {
+            (Some(LevelOutcome::Solved), Some(count)) => {
+                write!(f, "{level}: solved in {} by {by}", counted(count.into(), "tick"))?
+            }
+            (Some(LevelOutcome::Solved), None) => write!(f, "{level}: solved")?,
+            (Some(LevelOutcome::ProvedUnsolvable), _) => write!(f, "{level}: UNSOLVABLE")?,
+            (Some(LevelOutcome::BotFailed), _) => write!(f, "{level}: NOT SOLVED, nothing proved")?,
+            (None, _) => write!(f, "{level}: not known")?,
+        }
+        if let Some(why) = &verdict.why {
+            write!(f, ": {why}")?;
+        }
+        let was = before.as_ref().filter(|before| before.outcome != verdict.outcome || before.ticks != verdict.ticks);
+        if let Some(was) = was {
+            match (was.outcome, was.ticks) {
+                (Some(LevelOutcome::Solved), Some(count)) => write!(f, " (before: {})", ticks(f64::from(count)))?,
+                (Some(outcome), _) => write!(f, " (before: {})", outcome.name())?,
+                (None, _) => {}
+            }
+        }
+        if let Some(stored) = &verdict.stored {
+            write!(f, "; the stored solution {stored}")?;
+        }
+        if let Some(places) = verdict.reached.filter(|places| places.open > 0) {
+            write!(f, "; the explorer reaches {} of {} open squares", places.visited, places.open)?;
+        }
+        if verdict.lost > 0 {
+            write!(f, "; {}", counted(verdict.lost, "death"))?;
+        }
+        // A proof that there is no way is a finding, too, and is told already.
+        for finding in verdict.findings.iter().filter(|finding| verdict.why.as_ref() != Some(&finding.message)) {
+            write!(f, "; {}: {}", finding.detector, finding.message)?;
+        }
+        write!(f, " [{seconds:.2} s]")
+    }
+}
+
+/// All saves, on disk and in memory.
+pub(super) struct Saves {
+    folder: PathBuf,
+    kept: Vec<Save>,
+    last_number: u64,
+}
+
+impl Saves {
+    /// Opens the saves in a folder, or begins there. Returns what is wrong with the earlier ones, which are left out then.
+    ///
+    /// # Errors
+    ///
+    /// The folder cannot be made.
+    pub fn open(folder: &Path) -> Result<(Self, Option<String>), CliError> {
+        let failed =
+            |error: std::io::Error| CliError::Io(format!("cannot keep saves in {}: {error}", folder.display()));
+        disk::create_dir_all(folder).map_err(failed)?;
+        let file = folder.join(SAVES);
+        let text = if file.is_file() { std::fs::read_to_string(&file).map_err(failed)? } else { String::new() };
+        let (mut kept, mut damaged) = (Vec::new(), 0);
+        for line in text.lines().filter(|line| !line.is_empty()) {
+            match serde_json::from_str::<Save>(line) {
+                Ok(save) => kept.push(save),
+                Err(_) => damaged += 1,
+            }
+        }
+        let message = (damaged > 0).then(|| {
+            let lines = counted(damaged, "line");
+            format!("{lines} of {} can no longer be read, and those saves are left out", file.display())
+        });
+        let last_number = kept.iter().map(|save| save.number).max().unwrap_or(0);
+        let kept = kept.split_off(kept.len().saturating_sub(MOST));
+        let saves = Self { folder: folder.to_owned(), kept, last_number };
+        // A file that only grows would be read for ever.
+        if text.lines().count() > 2 * MOST {
+            saves.write_all()?;
+        }
+        Ok((saves, message))
+    }
+
+    /// Returns the folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Returns the newest saves, in order.
+    pub fn all(&self) -> &[Save] {
+        &self.kept
+    }
+
+    /// Returns the number of the next save.
+    pub fn next(&self) -> u64 {
+        self.last_number + 1
+    }
+
+    /// Returns what was last known of a level.
+    pub fn last(&self, level: &str) -> Option<Before> {
+        let states = self.kept.iter().rev().flat_map(|save| save.levels.iter());
+        let state = states.filter(|state| state.problem.is_none()).find(|state| state.level == level)?;
+        let QuickVerdict { outcome, ticks, lost, .. } = &state.verdict;
+        Some(Before { outcome: *outcome, ticks: *ticks, lost: *lost })
+    }
+
+    /// Keeps a save.
+    ///
+    /// # Errors
+    ///
+    /// The disk refuses.
+    pub fn add(&mut self, save: Save) -> Result<(), CliError> {
+        let line = line(&save)?;
+        let path = self.folder.join(SAVES);
+        let begins_a_line = Stamp::of(&path).is_none() || std::fs::read(&path).is_ok_and(|text| text.ends_with(b"\n"));
+        let begin = if begins_a_line { "" } else { "\n" };
+        let append = || {
+            let mut file = DiskFile::open(&path, OpenOptions::new().create(true).append(true))?;
+            file.write_all(format!("{begin}{line}").as_bytes())
+        };
+        append().map_err(|error| CliError::Io(format!("cannot write {}: {error}", path.display())))?;
+        self.last_number = self.last_number.max(save.number);
+        self.kept.push(save);
+        if self.kept.len() > MOST {
+            self.kept.remove(0);
+        }
+        Ok(())
+    }
+
+    fn write_all(&self) -> Result<(), CliError> {
+        let lines: Result<String, CliError> = self.kept.iter().map(line).collect();
+        let path = self.folder.join(SAVES);
+        playbot_learner::write_atomically(&path, lines?.as_bytes())
+            .map_err(|error| CliError::Io(format!("cannot write {}: {error}", path.display())))
+    }
+}
+
+fn line(save: &Save) -> Result<String, CliError> {
+    let text = serde_json::to_string(save);
+    text.map(|text| format!("{text}\n"))
+        .map_err(|error| CliError::Io(format!("a save cannot be written as JSON: {error}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn state(level: &str, outcome: LevelOutcome, count: Option<u32>) -> LevelState {
+        let by = count.map(|_| "search".to_owned());
+        let verdict = QuickVerdict {
+            outcome: Some(outcome),
+            ticks: count,
+            solved_by: by,
+            is_final: true,
+            ..QuickVerdict::default()
+        };
+        LevelState { level: level.to_owned(), seconds: 0.25, verdict, before: None, problem: None, layout: None }
+    }
+
+    #[test]
+    fn saves_are_there_after_a_restart_and_a_torn_line_costs_one() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (mut saves, message) = Saves::open(folder.path()).expect("writable");
+        assert_eq!((saves.next(), message), (1, None));
+        for number in 1..=3 {
+            let mut save = Save::new(number);
+            save.put(state("a.json", LevelOutcome::BotFailed, None));
+            save.put(state("a.json", LevelOutcome::Solved, Some(100 + number as u32)));
+            assert_eq!(save.levels.len(), 1);
+            saves.add(save).expect("writable");
+        }
+        let file = folder.path().join(SAVES);
+        let text = fs::read_to_string(&file).expect("written");
+        fs::write(&file, &text[..text.len() - 20]).expect("writable");
+        let (mut again, message) = Saves::open(folder.path()).expect("readable");
+        assert!(message.is_some_and(|message| message.starts_with("1 line of ")), "it says so");
+        assert_eq!((again.all().len(), again.next()), (2, 3));
+        assert_eq!(again.last("a.json").and_then(|before| before.ticks), Some(102));
+        again.add(Save::new(3)).expect("writable");
+        assert_eq!(
+            Saves::open(folder.path()).expect("readable").0.all().len(),
+            3,
+            "the torn line does not swallow the next"
+        );
+    }
+
+    #[test]
+    fn a_level_is_described_in_one_line() {
+        let before = |outcome, ticks| Some(Before { outcome: Some(outcome), ticks, lost: 0 });
+        let solved = LevelState {
+            before: before(LevelOutcome::Solved, Some(130)),
+            ..state("a.json", LevelOutcome::Solved, Some(123))
+        };
+        assert_eq!(solved.to_string(), "a.json: solved in 123 ticks by search (before: 130) [0.25 s]");
+        let mut lost =
+            LevelState { before: before(LevelOutcome::Solved, None), ..state("a.json", LevelOutcome::BotFailed, None) };
+        lost.verdict.stored = Some("is lost after 40 ticks".to_owned());
+        lost.verdict.lost = 2;
+        let words = "a.json: NOT SOLVED, nothing proved (before: solved); the stored solution is lost after 40 ticks; 2 deaths \
+                     [0.25 s]";
+        assert_eq!(lost.to_string(), words);
+        let unreadable = LevelState::unreadable("b.json", "line 3: no rows".to_owned());
+        assert_eq!(unreadable.to_string(), "b.json: NOT TESTED: line 3: no rows");
+    }
+}

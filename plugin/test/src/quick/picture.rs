@@ -1,0 +1,113 @@
+//! The picture of a level with a way through it, or with the places that nobody reached.
+
+use crate::{
+    explore::{Exploration, open_cells},
+    verdict_report::{Block, Grid, path, shape, stacked},
+};
+use bevy::math::{Rect, Vec2};
+use playbot_harness::floor_plan::FloorPlan;
+use std::{collections::BTreeSet, fmt::Write};
+
+/// Most points of a way. Of more, evenly spaced ones are drawn.
+const MOST_POINTS: usize = 400;
+
+/// The squares that an explorer has reached, and those around the start and around the goal that it has not.
+pub(super) struct Reached {
+    reached: Vec<Rect>,
+    missed: Vec<Rect>,
+}
+
+impl Reached {
+    /// Returns them for cells that are squares.
+    pub fn of(explored: &Exploration, floor: &FloorPlan) -> Option<Self> {
+        let grid = explored.grid.as_ref()?;
+        let from_goal = open_cells(&FloorPlan { start: floor.goal, ..floor.clone() }, grid).unwrap_or_default();
+        let beyond = from_goal.iter().filter(|cell| !explored.cells().contains_key(cell));
+        let missed: BTreeSet<_> = explored.missed().chain(beyond).collect();
+        let reached = explored.cells().keys().filter_map(|cell| grid.area(cell)).collect();
+        Some(Self { reached, missed: missed.into_iter().filter_map(|cell| grid.area(cell)).collect() })
+    }
+}
+
+/// Returns the picture: the way that solves the level, the way of a solution that no longer does, and what an explorer has
+/// reached. `None` for a plan without extent.
+pub(super) fn picture(floor: &FloorPlan, way: &[Vec2], lost: &[Vec2], reached: Option<&Reached>) -> Option<String> {
+    let grid = Grid::new(floor.bounds)?;
+    let [width, height] = grid.size();
+    let mut svg = format!("<svg class=\"level\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"level\">");
+    let blocks = |areas: &[Rect]| {
+        let finite = areas.iter().filter(|area| area.min.is_finite() && area.max.is_finite());
+        stacked(finite.filter_map(|area| grid.block(*area)).collect::<Vec<Block>>())
+    };
+    if let Some(Reached { reached, missed }) = reached {
+        shape("reached", None, &path(&blocks(reached)), &mut svg);
+        shape("missed", None, &path(&blocks(missed)), &mut svg);
+    }
+    for (class, areas) in [("wall", &floor.walls), ("platform", &floor.platforms), ("hazard", &floor.hazards)] {
+        shape(class, None, &path(&blocks(areas)), &mut svg);
+    }
+    for (class, positions) in [("way", way), ("way lost-way", lost)] {
+        line(&grid, class, floor.start, positions, &mut svg);
+    }
+    if let Some([x, y]) = lost.last().and_then(|at| grid.place(*at)) {
+        shape("mark", None, &format!("M{} {}l14 14m0-14l-14 14", x - 7, y - 7), &mut svg);
+    }
+    if let Some([x, y]) = grid.place(floor.start) {
+        let _ = write!(svg, "<circle class=\"start\" cx=\"{x}\" cy=\"{y}\" r=\"7\"/>");
+    }
+    if let Some([x, y]) = grid.place(floor.goal) {
+        shape("goal", None, &format!("M{x} {}l9 9l-9 9l-9-9z", y - 9), &mut svg);
+    }
+    svg += "</svg>";
+    Some(svg)
+}
+
+/// Draws a way from the start through positions.
+fn line(grid: &Grid, class: &str, start: Vec2, positions: &[Vec2], svg: &mut String) {
+    if positions.is_empty() {
+        return;
+    }
+    let every = positions.len().div_ceil(MOST_POINTS);
+    let last = positions.last().filter(|_| !(positions.len() - 1).is_multiple_of(every));
+    let points = [start].into_iter().chain(positions.iter().copied().step_by(every)).chain(last.copied());
+    let mut d = String::new();
+    for [x, y] in points.filter_map(|at| grid.place(at)) {
+        let _ = write!(d, "{}{x} {y}", if d.is_empty() { 'M' } else { 'L' });
+    }
+    shape(class, None, &d, svg);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn floor() -> FloorPlan {
+        FloorPlan {
+            bounds: Rect::new(0.0, 0.0, 64.0, 16.0),
+            walls: vec![Rect::new(0.0, 0.0, 64.0, 1.0)],
+            start: Vec2::new(1.5, 1.5),
+            goal: Vec2::new(60.5, 1.5),
+            ..FloorPlan::default()
+        }
+    }
+
+    #[test]
+    fn a_way_begins_at_the_start_and_ends_at_the_last_position() {
+        let way: Vec<Vec2> = (0..1000_u16).map(|tick| Vec2::new(1.5 + f32::from(tick) * 0.059, 1.5)).collect();
+        let svg = picture(&floor(), &way, &[], None).expect("an extent");
+        assert!(svg.contains("<path class=\"way\" d=\"M15 145L") && svg.contains("L604 145\"/>"), "{svg}");
+        assert!(svg.len() < 8_000 && !svg.contains("lost-way") && !svg.contains("mark"), "{svg}");
+    }
+
+    #[test]
+    fn a_way_that_is_lost_ends_with_a_cross_and_unreached_places_are_shown() {
+        let svg = picture(&floor(), &[], &[Vec2::new(10.0, 2.0)], None).expect("an extent");
+        assert!(svg.contains("class=\"way lost-way\" d=\"M15 145L100 140\"") && svg.contains("M93 133l14 14"), "{svg}");
+        let reached =
+            Reached { reached: vec![Rect::new(1.0, 1.0, 2.0, 2.0)], missed: vec![Rect::new(2.0, 1.0, 64.0, 16.0)] };
+        let svg = picture(&floor(), &[], &[], Some(&reached)).expect("an extent");
+        assert!(svg.contains("<path class=\"reached\" d=\"M10 140h10v10h-10z\"/>"), "{svg}");
+        assert!(svg.contains("<path class=\"missed\" d=\"M20 0h620v150h-620z\"/>"), "{svg}");
+        assert_eq!(picture(&FloorPlan { bounds: Rect::default(), ..floor() }, &[], &[], None), None);
+    }
+}
