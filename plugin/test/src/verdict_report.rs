@@ -9,17 +9,23 @@
 //!
 //! The files of the folder, in reading order:
 //!
+//! - `selection`: the levels of the page, the worst ones first.
+//! - `gallery`: all levels as small pictures.
+//! - `cards`: findings as the game shows them.
 //! - `level_table`: the table of levels.
 //! - `drawn`: the drawings of the levels in the table, and descriptions of walks.
 //! - `picture`, `heat`, `clip`: the plan with the ends of episodes, maps over it, and the path of a failure.
 
+mod cards;
 mod clip;
 mod drawn;
+mod gallery;
 mod heat;
 mod level_table;
 mod picture;
+mod selection;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 #[cfg(test)]
 mod tests;
 
@@ -28,10 +34,7 @@ use crate::{
         AGAINST, Comparison, EpisodeScore, LevelVerdict, Overview, RESULTS, RecordedTotal, TestError, TestRecord,
         TesterRecord, Trials, comparable_command, wilson,
     },
-    verdict_report::{
-        drawn::Plans,
-        level_table::{Selection, level_table},
-    },
+    verdict_report::{cards::cards, drawn::Plans, gallery::gallery, level_table::level_table, selection::Selection},
 };
 use playbot_harness::game::Game;
 use playbot_report::{PAGE_STYLE, counted, escape::escape, whole};
@@ -42,14 +45,20 @@ use std::{
     path::Path,
 };
 
+pub use crate::verdict_report::cards::{FindingScene, SceneTick, Scenes};
+pub(crate) use crate::verdict_report::heat::{Block, Grid, path, shape, stacked};
+
 /// Name of the file in the folder of a test.
 pub const REPORT: &str = "report.html";
 
-/// Additional style of this report.
-pub(crate) const STYLE: &str = include_str!("verdict_report/levels.css");
+/// Additional style of this report, and of all pictures of levels.
+pub const STYLE: &str = include_str!("verdict_report/levels.css");
 
 /// Script that sorts and filters the table of levels.
 const SCRIPT: &str = include_str!("verdict_report/levels.js");
+
+/// Script that draws the gallery.
+const GALLERY_SCRIPT: &str = include_str!("verdict_report/gallery.js");
 
 /// Most letters of a foreign text, such as the message of a broken game.
 const MOST_LETTERS: usize = 400;
@@ -86,6 +95,8 @@ pub fn html(results: &Path, report: &HtmlReport) -> Result<String, TestError> {
         selection: &selection,
         plans: &plans,
         program: report.program,
+        folder: results,
+        scenes: report.scenes,
     };
     Ok(page.to_html())
 }
@@ -104,6 +115,8 @@ pub struct HtmlReport<'a> {
     pub comparison: Option<&'a Comparison>,
     /// Name of the program in the commands that the report shows.
     pub program: &'a str,
+    /// Draws findings as the game shows them; without it, they have the plans of their levels.
+    pub scenes: Option<Scenes<'a>>,
 }
 
 /// Content of the page.
@@ -118,6 +131,10 @@ pub struct Page<'a> {
     pub plans: &'a Plans<'a>,
     /// Name of the program in commands.
     pub program: &'a str,
+    /// Folder of the results.
+    pub folder: &'a Path,
+    /// Draws findings as the game shows them.
+    pub scenes: Option<Scenes<'a>>,
 }
 
 impl Page<'_> {
@@ -132,7 +149,9 @@ impl Page<'_> {
             counted(u64::from(record.episodes), "episode"),
             record.seed
         );
-        let body = numbers(self.overview)
+        let body = gallery(&in_short(self.overview), self.selection, self.plans)
+            + &cards(self.selection, self.plans, self.program, self.folder, self.scenes)
+            + &numbers(self.overview)
             + &self.comparison.map_or_else(String::new, |changes| compared(changes, record, self.program))
             + &recorded(&self.overview.recorded)
             + &level_table(record, self.selection, self.plans, self.program);
@@ -144,9 +163,20 @@ impl Page<'_> {
              script-src 'unsafe-inline'; img-src data:\">\n\
              <title>{title}</title>\n<style>\n{PAGE_STYLE}{STYLE}</style>\n</head>\n<body>\n<main>\n<header>\n\
              <h1>{title}</h1>\n<p class=\"subtitle\">{subtitle}</p>\n</header>\n{body}</main>\n\
-             <script>\n{SCRIPT}</script>\n</body>\n</html>\n"
+             <script>\n{SCRIPT}{GALLERY_SCRIPT}</script>\n</body>\n</html>\n"
         )
     }
+}
+
+/// Returns the outcomes of the levels in a line.
+fn in_short(overview: &Overview) -> String {
+    let [solved, failed, unsolvable] =
+        [overview.solved, overview.bot_failed, overview.proved_unsolvable].map(|count| whole(count as f64));
+    format!(
+        "{}: {solved} solved, {failed} unsolved, {unsolvable} unsolvable; {}",
+        counted(overview.levels, "level"),
+        counted(overview.findings, "finding")
+    )
 }
 
 /// Writes the outcomes of the levels, and the totals of each tester.

@@ -159,6 +159,11 @@ impl EpisodeWorld {
         }
     }
 
+    /// Returns the position of the agent, if the game reports it.
+    pub fn position(&self, game: &dyn Game) -> Option<Vec2> {
+        game.tools().state.position(&self.world, self.agent).filter(|position| position.is_finite())
+    }
+
     /// Returns the level.
     pub fn level(&self) -> u64 {
         self.level

@@ -4,7 +4,7 @@
 //!
 //! - `picture`: pictures of a finding: its last tick, or an animation.
 
-mod picture;
+pub(crate) mod picture;
 
 use crate::{
     arguments::check_start,

@@ -97,8 +97,13 @@ impl<'a> Plans<'a> {
 
     /// Returns the plan of a level of the test.
     pub fn get(&self, level: &LevelVerdict) -> Option<FloorPlan> {
+        self.at(level.index)
+    }
+
+    /// Returns the plan of the level with this index in the range of the test.
+    pub fn at(&self, index: u64) -> Option<FloorPlan> {
         let Self::Known { game, range } = self else { return None };
-        let number = range.first.checked_add(level.index).filter(|number| *number <= range.last)?;
+        let number = range.first.checked_add(index).filter(|number| *number <= range.last)?;
         game.tools().levels.floor_plan(&range.mode, number)
     }
 

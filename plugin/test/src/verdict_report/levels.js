@@ -44,25 +44,36 @@
     maps.hidden = false;
     show();
   }
-  // A clip plays once, after a click. Another click ends it.
+  // A clip plays once, after a click. Another click ends it. Details are shown in other places, too, so the page listens.
   let plays = 0;
-  for (const button of table.querySelectorAll("button.clip")) {
+  for (const button of table.querySelectorAll("button.clip")) button.hidden = false;
+  document.addEventListener("click", (event) => {
+    const button = event.target.closest("button.clip");
+    if (!button) return;
+    const shown = button.nextElementSibling;
+    if (shown?.tagName === "IMG") {
+      shown.remove();
+      button.textContent = "Play the failure";
+      return;
+    }
+    const clip = document.createElement("img");
+    clip.alt = "The plan of the level, with a dot that follows the path of the failure";
+    // A new address each time: a played clip would stay at its end.
+    plays += 1;
+    clip.src = `data:image/png;base64,${button.dataset.clip}#${plays}`;
+    button.after(clip);
+    button.textContent = "Stop";
+  });
+  // A scene moves while its button is on.
+  for (const button of document.querySelectorAll("button.moving")) {
     const words = button.textContent;
+    const picture = button.previousElementSibling;
+    const still = picture.src;
     button.hidden = false;
     button.addEventListener("click", () => {
-      const shown = button.nextElementSibling;
-      if (shown) {
-        shown.remove();
-        button.textContent = words;
-        return;
-      }
-      const clip = document.createElement("img");
-      clip.alt = "The plan of the level, with a dot that follows the path of the failure";
-      // A new address each time: a played clip would stay at its end.
-      plays += 1;
-      clip.src = `data:image/png;base64,${button.dataset.clip}#${plays}`;
-      button.after(clip);
-      button.textContent = "Stop";
+      const moves = picture.src !== still;
+      picture.src = moves ? still : `data:image/png;base64,${picture.dataset.moving}`;
+      button.textContent = moves ? words : "Stop";
     });
   }
   filter();

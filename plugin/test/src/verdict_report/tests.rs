@@ -14,7 +14,8 @@ use crate::{
 };
 use std::{collections::BTreeMap, fs, path::PathBuf};
 
-const PLAIN: HtmlReport<'static> = HtmlReport { game: Some(&Garden), comparison: None, program: "playbot" };
+const PLAIN: HtmlReport<'static> =
+    HtmlReport { game: Some(&Garden), comparison: None, program: "playbot", scenes: None };
 
 /// Makes the page of these levels of `hard:0..`.
 fn page(levels: &[LevelVerdict], report: &HtmlReport) -> String {
@@ -123,7 +124,7 @@ fn a_thousand_long_levels_are_less_than_ten_megabytes() {
     let html = page(&levels, &PLAIN);
     assert!(html.len() < 10_000_000, "{} bytes", html.len());
     assert_eq!(html.matches("<tbody data-k=").count(), 1000);
-    assert_eq!(html.matches("viewBox=\"0 0 640 160\"").count(), 200, "the worst ones have pictures");
+    assert_eq!(html.matches("viewBox=\"0 0 640 160\"").count(), 250, "the worst ones have pictures, and 50 findings");
     assert_eq!(html.matches("playbot test garden --levels hard:").count(), 1000, "all say how to see them");
     assert_eq!(html.matches("<g class=\"map visits\"><path").count(), 200, "and maps");
     let clips = html.matches("data-clip=\"iVBORw0KGgo").count();

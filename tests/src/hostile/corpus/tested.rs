@@ -197,5 +197,5 @@ fn handle(folder: &Path) {
     let _ = Overview::read(&test);
     let _ = write_reports(&test, comparison, "playbot");
     // Without an error it is the page, which is not checked here.
-    let _ = html(&test, &HtmlReport { game: Some(&GAME), comparison, program: "playbot" });
+    let _ = html(&test, &HtmlReport { game: Some(&GAME), comparison, program: "playbot", scenes: None });
 }

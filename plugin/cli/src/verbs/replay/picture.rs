@@ -100,7 +100,7 @@ fn picture_of(game: &dyn Game, mode: &str, level: u64) -> Option<LevelPicture> {
 }
 
 /// Returns the pictures that a game has, or else its numbers.
-fn seen_as(game: &dyn Game) -> ObservationConfig {
+pub(crate) fn seen_as(game: &dyn Game) -> ObservationConfig {
     let of = |kind| ObservationConfig { kind, ..ObservationConfig::default() };
     if game.tools().pictures.picture().is_some() {
         return of(ObservationKind::Raster);

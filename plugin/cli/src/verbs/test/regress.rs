@@ -33,7 +33,7 @@ pub struct RegressArgs {
         long,
         value_name = "DIR",
         conflicts_with_all = [
-            "game", "levels", "bot", "policy", "run", "checkpoint", "greedy", "episodes", "seed", "out", "against", "shard",
+            "game", "levels", "bot", "policy", "run", "checkpoint", "greedy", "episodes", "seed", "out", "history", "against", "shard",
             "resume", "force", "minimise", "keep_failures", "detect", "no_detect", "par",
         ]
     )]

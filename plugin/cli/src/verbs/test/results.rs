@@ -4,6 +4,7 @@ use crate::{
     error::{CliError, Outcome},
     output,
     output::{print_line, print_table, program},
+    verbs::test::scenes::SceneMaker,
 };
 use playbot_harness::{brief::shell_word, game::Game};
 use playbot_report::{PlainTable, counted, ticks, whole};
@@ -70,8 +71,12 @@ pub fn report_results(results: &Results) -> Result<Outcome, CliError> {
     );
     let not_written = |error| output::with_advice(error, &next);
     let overview = write_reports(results.folder, comparison.as_ref(), program::name()).map_err(not_written)?;
-    let report = HtmlReport { game: results.game, comparison: comparison.as_ref(), program: program::name() };
+    let maker = results.game.map(SceneMaker::new);
+    let scene = |file: &Path| maker.as_ref()?.scene(file);
+    let (game, program) = (results.game, program::name());
+    let report = HtmlReport { game, comparison: comparison.as_ref(), program, scenes: Some(&scene) };
     write_html(results.folder, &results.folder.join(REPORT), &report).map_err(not_written)?;
+    drop(maker);
     if results.json {
         let mut lines = ResultLines::open(results.folder)?;
         while let Some(line) = lines.next_line()? {

@@ -1,0 +1,143 @@
+(() => {
+  const source = document.getElementById("gallery-data");
+  if (!source) return;
+  const { levels, plans } = JSON.parse(source.textContent);
+  const box = document.getElementById("gallery");
+  const chosen = document.getElementById("chosen");
+  document.getElementById("gallery-section").hidden = false;
+  // Sizes of a tile in pixels, rows that are drawn before they come into view, and tiles on paper.
+  const [width, height, gap, ahead, most] = [168, 132, 10, 2, 300];
+  const outcomes = ["proved-unsolvable", "bot-failed", "solved"];
+  const signs = ["✗", "?", "✓"];
+  const words = ["proved unsolvable", "unsolved, nothing proved", "solved"];
+  const inner = document.createElement("div");
+  box.append(inner);
+  const tiles = new Map();
+  let columns = 1;
+  let current = -1;
+
+  const draw = (canvas, plan) => {
+    const rows = plan.split("/").map((row) => row.replace(/(\d+)(\D)/g, (_, count, letter) => letter.repeat(Number(count))));
+    const wide = Math.max(...rows.map((row) => row.length));
+    // Pixels of the screen, so that edges are sharp.
+    const dense = Math.ceil(window.devicePixelRatio || 1);
+    const side = Math.max(1, Math.floor(dense * Math.min((width - 14) / wide, (height - 46) / rows.length)));
+    canvas.width = side * wide;
+    canvas.height = side * rows.length;
+    canvas.style.width = `${canvas.width / dense}px`;
+    const context = canvas.getContext("2d");
+    const style = getComputedStyle(document.documentElement);
+    const colours = { "#": "--wall", "=": "--platform", "^": "--hazard", S: "--text", G: "--goal" };
+    for (const letter of Object.keys(colours)) colours[letter] = style.getPropertyValue(colours[letter]).trim();
+    rows.forEach((row, y) => {
+      for (let x = 0; x < row.length; x += 1) {
+        const colour = colours[row[x]];
+        if (!colour) continue;
+        context.fillStyle = colour;
+        // Start and goal are seen in small pictures, too.
+        const more = row[x] === "S" || row[x] === "G" ? Math.max(side, 4 * dense) : side;
+        context.fillRect(x * side - (more - side) / 2, y * side - (more - side) / 2, more, more);
+      }
+    });
+  };
+  const tile = (index) => {
+    const level = levels[index];
+    const made = document.createElement("div");
+    made.id = `tile-${index}`;
+    made.className = `tile ${outcomes[level.o]}`;
+    made.setAttribute("role", "option");
+    made.setAttribute("aria-selected", String(index === current));
+    const found = level.f > 0 ? `, ${level.f} finding${level.f === 1 ? "" : "s"}` : "";
+    made.setAttribute("aria-label", `${level.n}: ${words[level.o]}${found}, ${level.w}`);
+    made.title = level.n;
+    const picture = document.createElement("div");
+    picture.className = "plan";
+    if (level.p >= 0) {
+      const canvas = document.createElement("canvas");
+      draw(canvas, plans[level.p]);
+      picture.append(canvas);
+    }
+    const name = document.createElement("span");
+    // The end of a path says more than its begin.
+    name.textContent = level.n.length > 22 ? `…${level.n.slice(-21)}` : level.n;
+    const sign = document.createElement("b");
+    sign.textContent = `${signs[level.o]}${level.f > 0 ? "!" : ""} `;
+    const note = document.createElement("small");
+    note.append(sign, level.w);
+    made.append(picture, name, note);
+    made.addEventListener("click", () => choose(index));
+    return made;
+  };
+  const paint = (all = false) => {
+    columns = Math.max(1, Math.floor((box.clientWidth - gap) / (width + gap)));
+    const wide = Math.floor((box.clientWidth - gap) / columns);
+    const rows = Math.ceil(levels.length / columns);
+    inner.style.height = `${rows * (height + gap) + gap}px`;
+    const first = all ? 0 : Math.max(0, Math.floor(box.scrollTop / (height + gap)) - ahead);
+    const last = all ? Math.ceil(most / columns) : Math.ceil((box.scrollTop + box.clientHeight) / (height + gap)) + ahead;
+    const wanted = new Set();
+    for (let index = first * columns; index < Math.min(last * columns, levels.length); index += 1) wanted.add(index);
+    for (const [index, made] of tiles) {
+      if (!wanted.has(index)) {
+        made.remove();
+        tiles.delete(index);
+      }
+    }
+    for (const index of wanted) {
+      if (!tiles.has(index)) {
+        tiles.set(index, tile(index));
+        inner.append(tiles.get(index));
+      }
+      const made = tiles.get(index);
+      made.style.left = `${gap + (index % columns) * wide}px`;
+      made.style.width = `${wide - gap}px`;
+      made.style.top = `${gap + Math.floor(index / columns) * (height + gap)}px`;
+    }
+  };
+  const move = (index) => {
+    tiles.get(current)?.setAttribute("aria-selected", "false");
+    current = Math.min(Math.max(index, 0), levels.length - 1);
+    const top = Math.floor(current / columns) * (height + gap);
+    if (top < box.scrollTop) box.scrollTop = top;
+    if (top + height + 2 * gap > box.scrollTop + box.clientHeight) box.scrollTop = top + height + 2 * gap - box.clientHeight;
+    paint();
+    tiles.get(current)?.setAttribute("aria-selected", "true");
+    box.setAttribute("aria-activedescendant", `tile-${current}`);
+  };
+  // The details are those of the table.
+  const rows = new Map();
+  for (const body of document.getElementById("levels")?.tBodies ?? []) rows.set(body.rows[0].cells[0].textContent, body);
+  const choose = (index) => {
+    move(index);
+    const level = levels[index];
+    const heading = document.createElement("h3");
+    heading.textContent = level.n;
+    const outcome = document.createElement("p");
+    outcome.className = outcomes[level.o];
+    outcome.textContent = `${words[level.o]}; ${level.w}`;
+    const card = rows.get(level.n)?.querySelector(".card");
+    chosen.replaceChildren(heading, outcome, ...(card ? card.cloneNode(true).childNodes : []));
+    chosen.hidden = false;
+    chosen.scrollIntoView({ block: "nearest" });
+  };
+  box.addEventListener("keydown", (event) => {
+    const page = columns * Math.max(1, Math.floor(box.clientHeight / (height + gap)));
+    const steps = { ArrowRight: 1, ArrowLeft: -1, ArrowDown: columns, ArrowUp: -columns, PageDown: page, PageUp: -page };
+    if (event.key in steps) move(current < 0 ? 0 : current + steps[event.key]);
+    else if (event.key === "Home") move(0);
+    else if (event.key === "End") move(levels.length - 1);
+    else if ((event.key === "Enter" || event.key === " ") && current >= 0) choose(current);
+    else return;
+    event.preventDefault();
+  });
+  box.addEventListener("scroll", () => paint());
+  new ResizeObserver(() => paint()).observe(box);
+  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+    for (const made of tiles.values()) made.remove();
+    tiles.clear();
+    paint();
+  });
+  window.addEventListener("beforeprint", () => paint(true));
+  window.addEventListener("afterprint", () => paint());
+  paint();
+})();
