@@ -9,6 +9,7 @@ mod init;
 mod levels;
 mod merging;
 mod named_policies;
+mod over_builds;
 mod paths;
 mod planting;
 #[path = "../shared/program.rs"]

@@ -9,8 +9,8 @@ use crate::{
     progress,
     progress::interrupt,
     verbs::{
-        bench, bugs, completions, config, demo, doctor, eval, explore, eyes, init, learn_skills, level, levels, play,
-        policy, quickstart, record, replay, report, runs, study, test, trace, train, view,
+        bench, bugs, completions, config, demo, doctor, eval, explore, eyes, history, init, learn_skills, level,
+        levels, play, policy, quickstart, record, replay, report, runs, study, test, trace, train, view, watch,
     },
 };
 use bevy_playbot::unknown_name::{nearest, question};
@@ -62,6 +62,7 @@ Examples:
   playbot train --skills skills.safetensors --run runs/first
   playbot eval --run runs/first --json
   playbot test GAME --levels MODE:0..99 --out runs/test   which levels can be solved?
+  playbot watch GAME --levels MODE:0..9   test levels while they are drawn
   playbot replay runs/test/findings/NAME.finding --apng failure.png   what was found
   playbot policy export --run runs/first --out GAME.policy
   playbot config show --set ppo.lr=0.0003   an experiment with all its values
@@ -90,6 +91,7 @@ enum Verb {
     Test(test::Args),
     Replay(replay::Args),
     Report(report::Args),
+    History(history::Args),
     Explore(explore::Args),
     Eyes(eyes::Args),
     Policy(policy::Args),
@@ -98,6 +100,7 @@ enum Verb {
     Levels(levels::Args),
     Trace(trace::Args),
     View(view::Args),
+    Watch(watch::Args),
     Bench(bench::Args),
     Bugs(bugs::Args),
     Completions(completions::Args),
@@ -268,6 +271,7 @@ fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
         Verb::Eval(args) => args.compute.threads(),
         Verb::Test(args) => args.compute.threads(),
         Verb::Explore(args) => args.compute.threads(),
+        Verb::Watch(args) => args.compute.threads(),
         Verb::Bench(args) => args.threads,
         _ => usable_threads(default_threads()),
     };
@@ -291,6 +295,7 @@ fn run_on_threads(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
         Verb::Test(args) => test::run(&args, games),
         Verb::Replay(args) => replay::run(&args, games),
         Verb::Report(args) => report::run(&args, games),
+        Verb::History(args) => history::run(&args),
         Verb::Explore(args) => explore::run(args, games),
         Verb::Eyes(args) => eyes::run(args, games),
         Verb::Policy(args) => policy::run(args, games),
@@ -299,6 +304,7 @@ fn run_on_threads(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
         Verb::Levels(args) => levels::run(&args, games),
         Verb::Trace(args) => trace::run(args, games),
         Verb::View(args) => view::run(args, games),
+        Verb::Watch(args) => watch::run(&args, games),
         Verb::Bench(args) => bench::run(args, games),
         Verb::Bugs(args) => bugs::run(args, games),
         Verb::Completions(args) => completions::run(&args, with_own_name(Cli::command())),

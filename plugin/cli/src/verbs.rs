@@ -1,7 +1,8 @@
 //! The verbs of the command line: a module each, with its options (`Args`) and its `run`.
 //!
 //! - Begin: [`init`].
-//! - Test levels: [`mod@test`], [`doctor`], [`replay`], [`explore`], [`levels`], [`report`], [`bugs`].
+//! - Test levels: [`mod@test`], [`doctor`], [`replay`], [`explore`], [`levels`], [`watch`], [`report`],
+//!   [`history`], [`bugs`].
 //! - See levels and episodes: [`level`], [`trace`], [`view`], [`eyes`], [`play`].
 //! - Record: [`record`], [`demo`].
 //! - Learn: [`quickstart`], [`learn_skills`], [`train`], [`study`], [`eval`], [`config`], [`runs`], [`policy`],
@@ -22,6 +23,7 @@ pub(crate) mod doctor;
 pub(crate) mod eval;
 pub(crate) mod explore;
 pub(crate) mod eyes;
+pub(crate) mod history;
 pub(crate) mod init;
 pub(crate) mod learn_skills;
 pub(crate) mod level;
@@ -38,3 +40,4 @@ pub(crate) mod test;
 pub(crate) mod trace;
 pub(crate) mod train;
 pub(crate) mod view;
+pub(crate) mod watch;

@@ -12,6 +12,8 @@
 //! - [`findings`]: findings as files that replay, get shorter, and become tests.
 //! - [`explore`]: exploration of a level without training.
 //! - [`verdict_report`]: results as one HTML page, with pictures of the worst levels.
+//! - [`history`]: levels and findings over the builds of a game.
+//! - [`quick`]: the verdict on a level while somebody draws it.
 
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
 
@@ -19,5 +21,7 @@ pub mod assertions;
 pub mod detectors;
 pub mod explore;
 pub mod findings;
+pub mod history;
+pub mod quick;
 pub mod verdict;
 pub mod verdict_report;

@@ -70,8 +70,9 @@ pub use crate::verdict::{
     merge::merge,
     plan::{TestPlan, TestRecord, TestedRun, Tester, TesterRecord},
     reports::{
-        AGAINST, JUNIT, SUMMARY, action_search, comparable_command, missing_failure, report_date, rerun_commands,
-        write_reports,
+        AGAINST, JUNIT, SUMMARY, action_search, comparable_command,
+        issues::{IssueForm, issues},
+        missing_failure, report_date, rerun_commands, write_reports,
     },
     results::{FinishTime, MOST_WORST, Overview, RESULTS, RecordedTotal, ResultLines, TesterTotal, results_folder},
     run::{TestEnd, TestObserver, run_tests, run_tests_keeping, test_in_turn},

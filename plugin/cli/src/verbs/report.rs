@@ -6,21 +6,25 @@ use crate::{
     output,
     output::{print_line, print_table, program},
     pictures::plot::PlotFile,
-    verbs::test::{Results, report_results},
+    verbs::test::{Results, SceneMaker, report_results},
 };
 use playbot_harness::games::Games;
 use playbot_mutation::calibration::{Calibration, CalibrationError};
 use playbot_test::{
-    verdict::{Comparison, RESULTS, ResultLines, TestRecord, merge, results_folder},
+    verdict::{Comparison, IssueForm, RESULTS, ResultLines, TestRecord, issues, merge, results_folder},
     verdict_report::{HtmlReport, REPORT, without_pictures, write_html},
 };
-use std::{fs, path::PathBuf};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 /// Work with the results of tests.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot report merge runs/shard-0 runs/shard-1 --out runs/test
   playbot report html runs/test
+  playbot report issues runs/test --form sarif --out levels.sarif
   playbot report calibrate runs/test people.demo --out people.html")]
 pub struct Args {
     #[command(subcommand)]
@@ -33,6 +37,8 @@ enum Verb {
     Merge(MergeArgs),
     /// Write the page of results again.
     Html(HtmlArgs),
+    /// List what is wrong, in a form that build servers and editors read.
+    Issues(IssuesArgs),
     /// Compare the results with recordings of people.
     Calibrate(CalibrateArgs),
 }
@@ -41,6 +47,7 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     match &args.verb {
         Verb::Merge(args) => run_merge(args, games),
         Verb::Html(args) => run_html(args, games),
+        Verb::Issues(args) => run_issues(args),
         Verb::Calibrate(args) => run_calibrate(args, games),
     }
 }
@@ -116,8 +123,8 @@ fn check_out(args: &MergeArgs, shards: &[PathBuf]) -> Result<(), CliError> {
 
 // `playbot report html`.
 
-/// Write the page of results again: one file that opens without network, with a table of the levels to sort and filter,
-/// and pictures of the worst of them.
+/// Write the page of results again: one file that opens without network, with a gallery of the levels, the findings as the
+/// game shows them, and a table to sort and filter.
 ///
 /// `playbot test` and `playbot report merge` write it too. Pictures need the game, in the version that was tested.
 #[derive(clap::Args)]
@@ -153,7 +160,10 @@ pub(crate) fn run_html(args: &HtmlArgs, games: &Games) -> Result<Outcome, CliErr
         }
         report!("warning: the page has no pictures: {why}");
     }
-    let report = HtmlReport { game, comparison: comparison.as_ref(), program: program::name() };
+    let maker = game.map(SceneMaker::new);
+    let scene = |file: &Path| maker.as_ref()?.scene(file);
+    let program = program::name();
+    let report = HtmlReport { game, comparison: comparison.as_ref(), program, scenes: Some(&scene) };
     write_html(folder, &file, &report).map_err(|error| {
         output::with_advice(
             error,
@@ -161,6 +171,51 @@ pub(crate) fn run_html(args: &HtmlArgs, games: &Games) -> Result<Outcome, CliErr
         )
     })?;
     report!("{}", file.display());
+    Ok(Outcome::Pass)
+}
+
+// `playbot report issues`.
+
+/// List what is wrong with the levels of results, in a form that build servers and editors read.
+///
+/// Each finding is an issue, and each level that no tester solved and that has none. Levels of files are annotated at their
+/// file. `github` prints commands of a workflow, which annotate the files of a pull request.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot report issues runs/test --form github
+  playbot report issues runs/test --form sarif --out levels.sarif
+  playbot report issues runs/test --form code-quality --out gl-code-quality-report.json")]
+pub struct IssuesArgs {
+    /// Folder of the results.
+    #[arg(value_name = "DIR")]
+    results: PathBuf,
+    /// The form: sarif (GitHub's code scanning, editors), code-quality (GitLab), warnings (Jenkins), or github (annotations).
+    #[arg(long, value_parser = form)]
+    form: IssueForm,
+    /// File to write instead of standard output. An existing one is replaced.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+fn form(text: &str) -> Result<IssueForm, String> {
+    let names: Vec<&str> = IssueForm::ALL.iter().map(|form| form.name()).collect();
+    IssueForm::ALL
+        .into_iter()
+        .find(|form| form.name() == text)
+        .ok_or_else(|| format!("it must be one of {}", names.join(", ")))
+}
+
+pub(crate) fn run_issues(args: &IssuesArgs) -> Result<Outcome, CliError> {
+    args.out.as_deref().map(output::prepare).transpose()?;
+    let text = issues(results_folder(&args.results), args.form)?;
+    match &args.out {
+        Some(file) => {
+            output::write(file, text.as_bytes())?;
+            report!("{}", file.display());
+        }
+        None if text.is_empty() => {}
+        None => print_line(text.trim_end())?,
+    }
     Ok(Outcome::Pass)
 }
 

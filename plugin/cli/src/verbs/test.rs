@@ -4,10 +4,12 @@
 //!
 //! - `testers`: testers on the command line.
 //! - `results`: report of results, and the files that go with them.
+//! - `scenes`: findings as the game shows them.
 //! - `regress`: replay of stored findings, and detectors on the command line.
 
 mod regress;
 mod results;
+mod scenes;
 mod testers;
 
 use crate::{
@@ -15,9 +17,9 @@ use crate::{
     error::{CliError, Outcome},
     progress,
     progress::interrupt,
-    verbs::test::{
-        regress::{DetectorArgs, RegressArgs, forget_slow_ticks, list_detectors, report_slow_ticks},
-        testers::TesterArgs,
+    verbs::{
+        history::{add_results, check_history},
+        test::regress::{RegressArgs, forget_slow_ticks, report_slow_ticks},
     },
 };
 use playbot_harness::{game::Game, games::Games, level_audit::EqualLevels, split::LevelSplit};
@@ -33,6 +35,12 @@ use playbot_test::{
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
+};
+
+pub(crate) use crate::verbs::test::{
+    regress::{DetectorArgs, list_detectors},
+    scenes::SceneMaker,
+    testers::TesterArgs,
 };
 
 pub use crate::verbs::test::results::{Results, report_results};
@@ -59,6 +67,7 @@ pub use crate::verbs::test::results::{Results, report_results};
   playbot test GAME --levels MODE:0..99 --against runs/before --out runs/after
   playbot test GAME --levels MODE:0..99 --detect reward-loop --detector stuck.ticks=200 --out runs/test
   playbot test GAME --levels MODE:0..99 --par pars.json --out runs/test
+  playbot test GAME --levels MODE:0..99 --history history.jsonl --build monday --out runs/test
   playbot test GAME --levels MODE:0..99999 --shard 0/4 --out runs/shard-0   one of four machines")]
 pub struct Args {
     /// Name of the game (not with --regress).
@@ -83,6 +92,12 @@ pub struct Args {
     /// build, to report on which of the levels that it solves its actions lead elsewhere or end otherwise now.
     #[arg(long, value_name = "PATH")]
     against: Option<PathBuf>,
+    /// Add the results to this file of a history, which `playbot history` shows (not with --regress).
+    #[arg(long, value_name = "FILE")]
+    history: Option<PathBuf>,
+    /// Name of this build in the history (default: the revision that a build server names, or a number).
+    #[arg(long, value_name = "NAME", requires = "history")]
+    build: Option<String>,
     /// Folder for the results (not with --regress).
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -135,6 +150,7 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     let keeps_failures = args.findings.keep_failures;
     let results = Results { folder: out, against, game: Some(game), json: args.json, keeps_failures };
     results.check()?;
+    args.history.as_deref().map(|file| check_history(file, game)).transpose()?;
     let recorded = recording.map(|recording| RecordedWins::read(game, &plan, recording)).transpose()?;
     if let Some(before) = results.against {
         Comparison::check(before, &record)?;
@@ -170,6 +186,7 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     };
     folder.finish_against(&courses)?;
     let outcome = report_results(&results)?;
+    args.history.as_deref().map(|file| add_results(file, out, args.build.as_deref())).transpose()?;
     report_off(game, &plan.detectors);
     Ok(outcome)
 }

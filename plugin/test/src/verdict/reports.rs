@@ -1,8 +1,10 @@
 //! Reports of results. They are a page of Markdown, short enough for a pull request, JUnit XML for build servers, the
 //! files of findings, and the commands that show a level again.
 //!
-//! The file `junit` of the folder writes the XML.
+//! - `junit`: the XML.
+//! - [`issues`](mod@issues): lists of what is wrong, for build servers and editors.
 
+pub mod issues;
 mod junit;
 
 use crate::{
