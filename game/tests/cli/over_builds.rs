@@ -71,3 +71,86 @@ fn what_is_no_history_is_refused_before_the_test() {
     let (_, said) = ended(folder, &["history", "nothing.jsonl"], 3);
     assert!(said.contains("nothing.jsonl"), "{said}");
 }
+
+/// Returns the script of a step of the action for GitHub.
+#[cfg(unix)]
+fn script_of(step: &str) -> String {
+    let action = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../action.yml")).expect("it is there");
+    let (_, rest) = action.split_once(&format!("- name: {step}\n")).expect("the step");
+    let (_, script) = rest.split_once("      run: |\n").expect("its script");
+    script.lines().take_while(|line| line.starts_with("        ")).map(|line| format!("{}\n", &line[8..])).collect()
+}
+
+#[cfg(unix)]
+#[test]
+fn the_action_annotates_files_and_ends_as_the_test_does() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    fs::create_dir(folder.join("release")).expect("writable");
+    std::os::unix::fs::symlink(env!("CARGO_BIN_EXE_playbot"), folder.join("release/bots")).expect("writable");
+    let (text, _) = ended(folder, &["level", "coinrun", "--mode", "easy", "--level", "3", "--json"], 0);
+    let mut level: Value = serde_json::from_str(&text).expect("JSON");
+    for wanted in [0, 1] {
+        fs::write(folder.join("a.json"), level.to_string()).expect("writable");
+        let mut step = std::process::Command::new("bash");
+        step.args(["-e", "-o", "pipefail", "-c", &script_of("Test")]).current_dir(folder);
+        step.envs([("PROGRAM", "bots"), ("GAME", "coinrun"), ("LEVELS", "files:*.json"), ("OUT", "runs/test")]);
+        step.envs([("ARGUMENTS", "--bot search,random --episodes 2"), ("CARGO_TARGET_DIR", ".")]);
+        step.envs([("GITHUB_STEP_SUMMARY", "summary"), ("GITHUB_OUTPUT", "output")]);
+        let output = step.output().expect("a shell");
+        let said = String::from_utf8_lossy(&output.stdout);
+        assert_eq!(output.status.code(), Some(wanted), "{said}{}", String::from_utf8_lossy(&output.stderr));
+        assert_eq!(said.contains("::error file=a.json,line=1,title=unreachable-goal::"), wanted == 1, "{said}");
+        for file in ["summary", "output", "runs/test/levels.sarif", "runs/test/report.html"] {
+            assert!(folder.join(file).is_file(), "{file}");
+        }
+        for row in level["rows"].as_array_mut().expect("rows") {
+            let cells = row.as_str().expect("a row").to_owned();
+            *row = format!("{}#{}", &cells[..9], &cells[10..]).into();
+        }
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn the_commit_since_which_a_finding_happens_is_found() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let git = |words: &[&str]| {
+        let mut git = std::process::Command::new("git");
+        git.args(["-c", "user.name=a", "-c", "user.email=a@b", "-c", "init.defaultBranch=main"]).args(words);
+        let output = git.current_dir(folder).output().expect("git");
+        assert!(output.status.success(), "{words:?}: {}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8_lossy(&output.stdout).trim().to_owned()
+    };
+    let (text, _) = ended(folder, &["level", "coinrun", "--mode", "easy", "--level", "3", "--json"], 0);
+    let mut level: Value = serde_json::from_str(&text).expect("JSON");
+    git(&["init", "-q"]);
+    fs::write(folder.join(".gitignore"), "runs\n").expect("writable");
+    let mut commits = Vec::new();
+    for number in 0..6 {
+        if number == 4 {
+            for row in level["rows"].as_array_mut().expect("rows") {
+                let cells = row.as_str().expect("a row").to_owned();
+                *row = format!("{}#{}", &cells[..9], &cells[10..]).into();
+            }
+        }
+        fs::write(folder.join("a.json"), level.to_string()).expect("writable");
+        fs::write(folder.join("notes"), number.to_string()).expect("writable");
+        git(&["add", "-A"]);
+        git(&["commit", "-q", "-m", &format!("commit {number}")]);
+        commits.push(git(&["rev-parse", "HEAD"]));
+    }
+    ended(folder, &["test", "coinrun", "--levels", "files:*.json", "--bot", "search", "--out", "runs/a"], 1);
+    let finding =
+        fs::read_dir(folder.join("runs/a/findings")).expect("findings").next().expect("one").expect("readable");
+    let finding = finding.path().display().to_string();
+    let bisect = ["bisect", &finding, "--good", &commits[0], "--build", "test -f a.json"];
+    let program = ["--program", env!("CARGO_BIN_EXE_playbot")];
+    let (words, _) = ended(folder, &[&bisect[..], &program].concat(), 1);
+    assert!(words.trim_end().ends_with("a: commit 4"), "{words}");
+    assert_eq!(git(&["rev-parse", "HEAD"]), commits[5], "it is where it was");
+    fs::write(folder.join("notes"), "changed").expect("writable");
+    let (_, said) = ended(folder, &[&bisect[..], &program].concat(), 3);
+    assert!(said.contains("files have changed since the last commit") && said.contains("notes"), "{said}");
+}

@@ -9,8 +9,8 @@ use crate::{
     progress,
     progress::interrupt,
     verbs::{
-        bench, bugs, completions, config, demo, doctor, eval, explore, eyes, history, init, learn_skills, level,
-        levels, play, policy, quickstart, record, replay, report, runs, study, test, trace, train, view, watch,
+        bench, bisect, bugs, completions, config, demo, doctor, eval, explore, eyes, history, init, learn_skills,
+        level, levels, play, policy, quickstart, record, replay, report, runs, study, test, trace, train, view, watch,
     },
 };
 use bevy_playbot::unknown_name::{nearest, question};
@@ -92,6 +92,7 @@ enum Verb {
     Replay(replay::Args),
     Report(report::Args),
     History(history::Args),
+    Bisect(bisect::Args),
     Explore(explore::Args),
     Eyes(eyes::Args),
     Policy(policy::Args),
@@ -296,6 +297,7 @@ fn run_on_threads(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
         Verb::Replay(args) => replay::run(&args, games),
         Verb::Report(args) => report::run(&args, games),
         Verb::History(args) => history::run(&args),
+        Verb::Bisect(args) => bisect::run(&args),
         Verb::Explore(args) => explore::run(args, games),
         Verb::Eyes(args) => eyes::run(args, games),
         Verb::Policy(args) => policy::run(args, games),

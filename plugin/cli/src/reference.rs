@@ -7,7 +7,7 @@ use std::fmt::Write;
 /// The groups of verbs on the page, in the order of the page.
 const GROUPS: [(&str, &[&str]); 6] = [
     ("Begin", &["init"]),
-    ("Test levels", &["test", "doctor", "replay", "explore", "levels", "watch", "report", "history", "bugs"]),
+    ("Test levels", &["test", "doctor", "replay", "explore", "levels", "watch", "report", "history", "bisect", "bugs"]),
     ("See levels and episodes", &["level", "trace", "view", "eyes", "play"]),
     ("Record", &["record", "demo"]),
     ("Learn", &["quickstart", "learn-skills", "train", "study", "eval", "config", "runs", "policy", "bench"]),

@@ -2,7 +2,7 @@
 //!
 //! - Begin: [`init`].
 //! - Test levels: [`mod@test`], [`doctor`], [`replay`], [`explore`], [`levels`], [`watch`], [`report`],
-//!   [`history`], [`bugs`].
+//!   [`history`], [`bisect`], [`bugs`].
 //! - See levels and episodes: [`level`], [`trace`], [`view`], [`eyes`], [`play`].
 //! - Record: [`record`], [`demo`].
 //! - Learn: [`quickstart`], [`learn_skills`], [`train`], [`study`], [`eval`], [`config`], [`runs`], [`policy`],
@@ -15,6 +15,7 @@
 //! [`reference`](crate::reference).
 
 pub(crate) mod bench;
+pub(crate) mod bisect;
 pub(crate) mod bugs;
 pub(crate) mod completions;
 pub(crate) mod config;

@@ -128,10 +128,10 @@ fn every_block_is_of_a_kind_that_is_checked() {
                 "toml" => {
                     assert!(block.contains("[dependencies]") || block.contains("-dependencies]"), "{path}:{line}")
                 }
-                // A workflow of GitHub or a job of GitLab that runs a command, in spaces, as YAML has it.
+                // A workflow of GitHub or a job of GitLab that runs a command or the action, in spaces, as YAML has it.
                 "yaml" => {
-                    let runs =
-                        block.contains("runs-on:") && block.contains("- run: ") || block.contains("\n  script: ");
+                    let is_workflow = block.contains("- run: ") || block.contains("- uses: <this repository>@");
+                    let runs = block.contains("runs-on:") && is_workflow || block.contains("\n  script: ");
                     assert!(runs && !block.contains('\t'), "{path}:{line}");
                 }
                 // Output of a command: the command stands above it, and can be called (see `commands`).
