@@ -157,5 +157,5 @@ fn levels_are_tested_once_for_scripts() {
     let (words, _) = ended(folder, &range, 0);
     assert!(words.lines().all(|line| line.starts_with("easy:") && line.contains(": solved in ")), "{words}");
     let (_, errors) = ended(folder, &["watch", "coinrun", "--levels", "easy:3..4", "--port", "0"], 3);
-    assert!(errors.contains("nothing can change: assets is not there"), "{errors}");
+    assert!(errors.contains("there is no assets; name what the levels depend on"), "{errors}");
 }

@@ -21,6 +21,7 @@ use crate::{
 use bevy::math::Vec2;
 use bevy_playbot::{action::ActionValue, episode::EpisodeEnd};
 use playbot_harness::{floor_plan::FloorPlan, game::Game, split::LevelSplit};
+use playbot_report::counted;
 use serde::{Deserialize, Serialize};
 use std::{cell::RefCell, collections::BTreeSet, ops::ControlFlow, rc::Rc};
 
@@ -269,11 +270,11 @@ fn is_solved(replayed: &Replayed) -> bool {
 
 /// Says how the actions end that no longer solve the level.
 fn end_in_words(replayed: &Replayed) -> String {
-    let ticks = replayed.rewards.len();
+    let ticks = counted(replayed.rewards.len() as u64, "tick");
     match (&replayed.broken, replayed.end.map(|end| end.end)) {
-        (Some(_), _) => format!("breaks the game after {ticks} ticks"),
-        (None, Some(EpisodeEnd::Truncated)) => format!("runs out of time after {ticks} ticks"),
-        (None, Some(EpisodeEnd::Terminated { .. })) => format!("is lost after {ticks} ticks"),
-        (None, None) => format!("does not reach the goal in its {ticks} ticks"),
+        (Some(_), _) => format!("breaks the game after {ticks}"),
+        (None, Some(EpisodeEnd::Truncated)) => format!("runs out of time after {ticks}"),
+        (None, Some(EpisodeEnd::Terminated { .. })) => format!("is lost after {ticks}"),
+        (None, None) => format!("does not reach the goal in its {ticks}"),
     }
 }

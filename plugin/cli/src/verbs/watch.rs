@@ -91,11 +91,11 @@ pub struct Args {
     /// Command that builds the program again when its code was saved. It runs in a shell.
     #[arg(long, value_name = "COMMAND", conflicts_with = "once")]
     rebuild: Option<String>,
-    /// Folder or file that --rebuild depends on (repeatable).
-    #[arg(long, value_name = "PATH", default_value = "src", conflicts_with = "once")]
+    /// Folder or file that --rebuild depends on (repeatable; default: src).
+    #[arg(long, value_name = "PATH", conflicts_with = "once", requires = "rebuild")]
     code: Vec<PathBuf>,
-    /// Folder or file that the levels of the game depend on (repeatable).
-    #[arg(long, value_name = "PATH", default_value = "assets", conflicts_with = "once")]
+    /// Folder or file that the levels of the game depend on (repeatable; default: assets).
+    #[arg(long, value_name = "PATH", conflicts_with = "once")]
     assets: Vec<PathBuf>,
     /// Port of the page; 0 takes any.
     #[arg(long, conflicts_with = "once")]
@@ -143,7 +143,7 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
         steps: args.steps,
         threads: args.compute.threads(),
     };
-    let (saves, message) = Saves::open(&args.out)?;
+    let (saves, message) = Saves::open(&args.out, args.known.is_some())?;
     message.iter().for_each(|message| report!("warning: {message}"));
     let page = if args.once { None } else { Some(Page::open(args.port, PORT, game.name(), saves.all())?) };
     if let Some(page) = &page {
@@ -156,7 +156,8 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     interrupt::leave(format!("all saves so far are kept in {}", args.out.display()));
     interrupt::listen();
     let solutions = Solutions::new(game, &args.out);
-    let mut watch = Watch { game, plan, saves, solutions, page, json: args.json };
+    let asks_stored = !args.once || args.known.is_some();
+    let mut watch = Watch { game, plan, saves, solutions, page, json: args.json, asks_stored };
     match (is_files, args.once) {
         (true, false) => watch.files(&LevelFiles::new(&split)?),
         (true, true) => {
@@ -193,6 +194,8 @@ struct Watch<'a> {
     solutions: Solutions<'a>,
     page: Option<Page>,
     json: bool,
+    /// Whether the actions that solved a level before are played.
+    asks_stored: bool,
 }
 
 impl Watch<'_> {
@@ -202,30 +205,36 @@ impl Watch<'_> {
         // The hash of each level when it was tested last.
         let mut tested: BTreeMap<String, u64> = BTreeMap::new();
         let mut due: BTreeMap<String, Instant> = BTreeMap::new();
+        // Those of an earlier watch may be gone.
+        let mut shown = self.saves.levels();
         let mut is_gone = false;
         while !interrupt::asked() {
             let (now, problem) = files.look();
+            let mut save = Save::new(self.saves.next());
             if problem.is_some() != is_gone {
                 is_gone = problem.is_some();
                 match &problem {
                     Some(problem) => report!("{problem}: waiting until there are some again"),
                     None => report!("there are level files again"),
                 }
+                save.problem = problem.map(|problem| format!("{problem}: waiting until there are some again"));
             }
             for (path, stamp) in &now {
                 if known.get(path) != Some(stamp) {
                     due.insert(path.clone(), Instant::now());
                 }
             }
-            let gone: Vec<String> = known.keys().filter(|path| !now.contains_key(*path)).cloned().collect();
-            for path in &gone {
+            save.gone = shown.iter().filter(|path| !now.contains_key(*path)).cloned().collect();
+            for path in &save.gone {
                 due.remove(path);
                 tested.remove(path);
+                if !self.json {
+                    print_line(format!("{path}: gone"))?;
+                }
             }
+            shown = now.keys().cloned().collect();
             known = now;
-            let mut save = Save::new(self.saves.next());
-            if !gone.is_empty() {
-                save.gone = gone;
+            if !save.is_empty() {
                 self.publish(&save);
             }
             let paths: Vec<(String, Instant)> = due.iter().map(|(path, since)| (path.clone(), *since)).collect();
@@ -270,7 +279,7 @@ impl Watch<'_> {
     fn rebuilt(&mut self, levels: &Rebuilt, sources: &Sources) -> Result<Outcome, CliError> {
         let mut seen = sources.look();
         let mut tested = BTreeSet::new();
-        let mut is_due = true;
+        let (mut is_due, mut is_first) = (true, true);
         let mut build = false;
         loop {
             if is_due {
@@ -289,6 +298,14 @@ impl Watch<'_> {
                         self.note(&mut save, state)
                     })?;
                     tested.extend(found);
+                    let now: BTreeSet<String> = save.levels.iter().map(|state| state.level.clone()).collect();
+                    if is_first {
+                        save.gone = self.saves.levels().difference(&now).cloned().collect();
+                        self.publish(&save);
+                    } else if save.is_empty() {
+                        report!("all levels are as they were before that save");
+                    }
+                    is_first = false;
                 }
                 if !save.is_empty() {
                     self.saves.add(save)?;
@@ -345,7 +362,8 @@ impl Watch<'_> {
     ) -> Result<bool, CliError> {
         let begin = Instant::now();
         let before = self.saves.last(name);
-        let solution = self.solutions.of(name);
+        // In a script the verdict is not to depend on what was found before.
+        let solution = if self.asks_stored { self.solutions.of(name) } else { None };
         let layout = self.game.layout(&split.mode, split.first).map(|layout| format!("{layout:016x}"));
         let state = |verdict: &QuickVerdict| LevelState {
             level: name.to_owned(),

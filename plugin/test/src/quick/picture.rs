@@ -11,6 +11,13 @@ use std::{collections::BTreeSet, fmt::Write};
 /// Most points of a way. Of more, evenly spaced ones are drawn.
 const MOST_POINTS: usize = 400;
 
+/// Lines over places that nobody reached, which no colour of a level has.
+const HATCH: &str = "<defs><pattern id=\"hatch\" width=\"12\" height=\"12\" patternUnits=\"userSpaceOnUse\">\
+                     <path class=\"hatch\" d=\"M-3 3l6-6M0 12L12 0M9 15l6-6\"/></pattern></defs>";
+
+/// Share of the plan by which the picture may be larger, for agents that leave it.
+const BEYOND: f32 = 0.5;
+
 /// The squares that an explorer has reached, and those around the start and around the goal that it has not.
 pub(super) struct Reached {
     reached: Vec<Rect>,
@@ -32,16 +39,23 @@ impl Reached {
 /// Returns the picture: the way that solves the level, the way of a solution that no longer does, and what an explorer has
 /// reached. `None` for a plan without extent.
 pub(super) fn picture(floor: &FloorPlan, way: &[Vec2], lost: &[Vec2], reached: Option<&Reached>) -> Option<String> {
-    let grid = Grid::new(floor.bounds)?;
+    let grid = Grid::new(extent(floor.bounds, way.iter().chain(lost)))?;
     let [width, height] = grid.size();
     let mut svg = format!("<svg class=\"level\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"level\">");
+    if reached.is_some() {
+        svg += HATCH;
+    }
     let blocks = |areas: &[Rect]| {
         let finite = areas.iter().filter(|area| area.min.is_finite() && area.max.is_finite());
         stacked(finite.filter_map(|area| grid.block(*area)).collect::<Vec<Block>>())
     };
     if let Some(Reached { reached, missed }) = reached {
         shape("reached", None, &path(&blocks(reached)), &mut svg);
-        shape("missed", None, &path(&blocks(missed)), &mut svg);
+        let missed = path(&blocks(missed));
+        shape("missed", None, &missed, &mut svg);
+        if !missed.is_empty() {
+            let _ = write!(svg, "<path class=\"hatched\" fill=\"url(#hatch)\" d=\"{missed}\"/>");
+        }
     }
     for (class, areas) in [("wall", &floor.walls), ("platform", &floor.platforms), ("hazard", &floor.hazards)] {
         shape(class, None, &path(&blocks(areas)), &mut svg);
@@ -60,6 +74,13 @@ pub(super) fn picture(floor: &FloorPlan, way: &[Vec2], lost: &[Vec2], reached: O
     }
     svg += "</svg>";
     Some(svg)
+}
+
+/// Returns the drawn area: the plan, with room for a way that leaves it.
+fn extent<'a>(bounds: Rect, positions: impl Iterator<Item = &'a Vec2>) -> Rect {
+    let most = bounds.inflate(BEYOND * bounds.size().max_element());
+    let finite = positions.filter(|position| position.is_finite());
+    finite.fold(bounds, |extent, position| extent.union_point(position.clamp(most.min, most.max)))
 }
 
 /// Draws a way from the start through positions.
@@ -108,6 +129,11 @@ mod tests {
         let svg = picture(&floor(), &[], &[], Some(&reached)).expect("an extent");
         assert!(svg.contains("<path class=\"reached\" d=\"M10 140h10v10h-10z\"/>"), "{svg}");
         assert!(svg.contains("<path class=\"missed\" d=\"M20 0h620v150h-620z\"/>"), "{svg}");
+        let high = picture(&floor(), &[Vec2::new(9.0, 20.0), Vec2::new(9.0, 1e9)], &[], None).expect("an extent");
+        assert!(
+            high.contains("viewBox=\"0 0 640 480\"") && high.contains("L90 280"),
+            "a way may leave the plan: {high}"
+        );
         assert_eq!(picture(&FloorPlan { bounds: Rect::default(), ..floor() }, &[], &[], None), None);
     }
 }

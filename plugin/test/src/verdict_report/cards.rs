@@ -64,7 +64,7 @@ pub(crate) fn cards(
         return String::new();
     }
     let mut out = String::from("<section>\n<h2>Findings</h2>\n");
-    out += "<p>Commands are for the folder of this page.";
+    out += "<p>Run the commands in the folder of this page.";
     if all > MOST_CARDS {
         let more = counted((all - MOST_CARDS) as u64, "more finding");
         let _ =

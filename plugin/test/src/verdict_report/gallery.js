@@ -14,6 +14,8 @@
   box.append(inner);
   const tiles = new Map();
   let columns = 1;
+  // The levels in view of the search, by their place in the data, and the place of the chosen one among them.
+  let listed = levels.map((_, place) => place);
   let current = -1;
 
   const draw = (canvas, plan) => {
@@ -41,7 +43,7 @@
     });
   };
   const tile = (index) => {
-    const level = levels[index];
+    const level = levels[listed[index]];
     const made = document.createElement("div");
     made.id = `tile-${index}`;
     made.className = `tile ${outcomes[level.o]}`;
@@ -71,12 +73,12 @@
   const paint = (all = false) => {
     columns = Math.max(1, Math.floor((box.clientWidth - gap) / (width + gap)));
     const wide = Math.floor((box.clientWidth - gap) / columns);
-    const rows = Math.ceil(levels.length / columns);
+    const rows = Math.ceil(listed.length / columns);
     inner.style.height = `${rows * (height + gap) + gap}px`;
     const first = all ? 0 : Math.max(0, Math.floor(box.scrollTop / (height + gap)) - ahead);
     const last = all ? Math.ceil(most / columns) : Math.ceil((box.scrollTop + box.clientHeight) / (height + gap)) + ahead;
     const wanted = new Set();
-    for (let index = first * columns; index < Math.min(last * columns, levels.length); index += 1) wanted.add(index);
+    for (let index = first * columns; index < Math.min(last * columns, listed.length); index += 1) wanted.add(index);
     for (const [index, made] of tiles) {
       if (!wanted.has(index)) {
         made.remove();
@@ -96,28 +98,35 @@
   };
   const move = (index) => {
     tiles.get(current)?.setAttribute("aria-selected", "false");
-    current = Math.min(Math.max(index, 0), levels.length - 1);
+    current = Math.min(Math.max(index, 0), listed.length - 1);
     const top = Math.floor(current / columns) * (height + gap);
     if (top < box.scrollTop) box.scrollTop = top;
     if (top + height + 2 * gap > box.scrollTop + box.clientHeight) box.scrollTop = top + height + 2 * gap - box.clientHeight;
     paint();
     tiles.get(current)?.setAttribute("aria-selected", "true");
     box.setAttribute("aria-activedescendant", `tile-${current}`);
+    if (!chosen.hidden) fill();
   };
   // The details are those of the table.
   const rows = new Map();
   for (const body of document.getElementById("levels")?.tBodies ?? []) rows.set(body.rows[0].cells[0].textContent, body);
-  const choose = (index) => {
-    move(index);
-    const level = levels[index];
+  const fill = () => {
+    const level = levels[listed[current]];
+    if (!level) return;
     const heading = document.createElement("h3");
     heading.textContent = level.n;
     const outcome = document.createElement("p");
     outcome.className = outcomes[level.o];
     outcome.textContent = `${words[level.o]}; ${level.w}`;
     const card = rows.get(level.n)?.querySelector(".card");
-    chosen.replaceChildren(heading, outcome, ...(card ? card.cloneNode(true).childNodes : []));
+    const none = document.createElement("p");
+    none.textContent = "It has no details here: results.json has them.";
+    chosen.replaceChildren(heading, outcome, ...(card ? card.cloneNode(true).childNodes : [none]));
+  };
+  const choose = (index) => {
+    move(index);
     chosen.hidden = false;
+    fill();
     chosen.scrollIntoView({ block: "nearest" });
   };
   box.addEventListener("keydown", (event) => {
@@ -125,18 +134,31 @@
     const steps = { ArrowRight: 1, ArrowLeft: -1, ArrowDown: columns, ArrowUp: -columns, PageDown: page, PageUp: -page };
     if (event.key in steps) move(current < 0 ? 0 : current + steps[event.key]);
     else if (event.key === "Home") move(0);
-    else if (event.key === "End") move(levels.length - 1);
+    else if (event.key === "End") move(listed.length - 1);
+    else if (event.key === "Escape") chosen.hidden = true;
     else if ((event.key === "Enter" || event.key === " ") && current >= 0) choose(current);
     else return;
     event.preventDefault();
   });
-  box.addEventListener("scroll", () => paint());
-  new ResizeObserver(() => paint()).observe(box);
-  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+  const repaint = () => {
     for (const made of tiles.values()) made.remove();
     tiles.clear();
     paint();
+  };
+  const form = document.getElementById("filter");
+  form?.addEventListener("input", () => {
+    const find = form.elements.words.value.trim().toLowerCase();
+    const kind = form.elements.kind.value;
+    const isOfKind = (level) => kind === "" || kind === outcomes[level.o] || (kind === "findings" && level.f > 0);
+    const isListed = ({ n, w }) => `${n} ${w}`.toLowerCase().includes(find);
+    listed = levels.map((_, place) => place).filter((place) => isOfKind(levels[place]) && isListed(levels[place]));
+    current = -1;
+    chosen.hidden = true;
+    repaint();
   });
+  box.addEventListener("scroll", () => paint());
+  new ResizeObserver(() => paint()).observe(box);
+  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
   window.addEventListener("beforeprint", () => paint(true));
   window.addEventListener("afterprint", () => paint());
   paint();

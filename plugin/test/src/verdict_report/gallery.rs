@@ -56,7 +56,8 @@ pub(crate) fn gallery(overview: &str, selection: &Selection, plans: &Plans) -> S
     }
     out += " The colour and the sign say the outcome: <b class=\"solved\">✓ solved</b>, <b class=\"bot-failed\">? unsolved, \
             nothing proved</b>, <b class=\"proved-unsolvable\">✗ proved unsolvable</b>; <b class=\"bot-failed\">!</b> marks \
-            findings. Arrow keys move, Enter shows a level.</p>\n\
+            findings. Grey are walls, black is the start, green \
+            the goal. Arrow keys move, Enter shows a level, Escape hides it.</p>\n\
             <div id=\"gallery\" role=\"listbox\" aria-labelledby=\"gallery-heading\" tabindex=\"0\"></div>\n\
             <div id=\"chosen\" class=\"card\" role=\"region\" aria-live=\"polite\" aria-label=\"The chosen level\" hidden></div>\n</section>\n";
     // In a script, `<` could end it.

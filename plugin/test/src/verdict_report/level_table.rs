@@ -64,7 +64,7 @@ pub(crate) fn level_table(record: &TestRecord, selection: &Selection, plans: &Pl
     } else if pictures == 0 && !selection.levels.is_empty() {
         out += WITHOUT_PLANS;
     } else if selection.levels.len() > pictures {
-        let _ = write!(out, " {pictures} of them have a picture.");
+        let _ = write!(out, " {pictures} of them have a picture here.");
     }
     if pictures > 0 || plans.problem().is_some() {
         out += map_scope(record.maps);

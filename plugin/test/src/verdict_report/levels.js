@@ -39,7 +39,7 @@
   form.hidden = false;
   const maps = document.getElementById("maps");
   if (maps) {
-    const show = () => { table.dataset.map = maps.elements.map.value; };
+    const show = () => { document.body.dataset.map = maps.elements.map.value; };
     maps.addEventListener("change", show);
     maps.hidden = false;
     show();

@@ -129,7 +129,7 @@ fn a_thousand_long_levels_are_less_than_ten_megabytes() {
     assert_eq!(html.matches("<g class=\"map visits\"><path").count(), 200, "and maps");
     let clips = html.matches("data-clip=\"iVBORw0KGgo").count();
     assert!((20..=60).contains(&clips), "{clips} clips");
-    assert!(html.contains(" 200 of them have a picture.") && html.contains("and 30 more in results.json"));
+    assert!(html.contains(" 200 of them have a picture here.") && html.contains("and 30 more in results.json"));
 }
 
 #[test]
@@ -250,7 +250,7 @@ fn maps_are_switched_and_explained_in_words() {
     }
     for kind in ["ends", "visits", "lost-time", "skills"] {
         assert!(html.contains(&format!("name=\"map\" value=\"{kind}\"")), "{kind}");
-        assert!(STYLE.contains(&format!("#levels[data-map=\"{kind}\"] .map.{kind}")), "{kind}");
+        assert!(STYLE.contains(&format!("[data-map=\"{kind}\"] .map.{kind}")), "{kind}");
     }
     let without = page(&[level(0, 1, 9, 5)], &PLAIN);
     assert!(without.contains("<g class=\"map ends\">") && !without.contains("<form id=\"maps\""), "{without}");

@@ -45,19 +45,26 @@ impl Sources {
     ///
     /// # Errors
     ///
-    /// None of them is there, so that nothing could ever change.
+    /// One of them is not there, so that it could never change. Assets that are not named need not be there beside code.
     pub fn new(code: &[PathBuf], assets: &[PathBuf], rebuild: Option<String>) -> Result<Self, CliError> {
-        let code = if rebuild.is_some() { code.to_vec() } else { Vec::new() };
-        let is_there = code.iter().chain(assets).any(|path| path.exists());
-        if !is_there {
-            let named: Vec<String> = code.iter().chain(assets).map(|path| path.display().to_string()).collect();
+        let there = |named: &[PathBuf], usual: &str| {
+            let all = if named.is_empty() { vec![PathBuf::from(usual)] } else { named.to_vec() };
+            let missing = all.iter().find(|path| !path.exists()).cloned();
+            (all, missing)
+        };
+        let ((code, no_code), (all_assets, no_assets)) = (there(code, "src"), there(assets, "assets"));
+        let needs_code = rebuild.is_some();
+        let is_named =
+            (needs_code && no_code.is_some()) || (no_assets.is_some() && (!assets.is_empty() || !needs_code));
+        let missing = if needs_code { no_code.or(no_assets) } else { no_assets };
+        if let Some(missing) = missing.filter(|_| is_named) {
             return Err(CliError::Usage(format!(
-                "nothing can change: {} is not there; name what the levels depend on with --assets, or with --rebuild and \
-                 --code, or level files with --levels files:PATTERN",
-                named.join(", ")
+                "nothing there could change: there is no {}; name what the levels depend on with --assets, or with --rebuild \
+                 and --code, or level files with --levels files:PATTERN",
+                missing.display()
             )));
         }
-        Ok(Self { code, assets: assets.to_vec(), rebuild })
+        Ok(Self { code: if needs_code { code } else { Vec::new() }, assets: all_assets, rebuild })
     }
 
     /// Returns the stamps of all files as they are now.
@@ -76,29 +83,29 @@ impl Sources {
         report!("building: {command}");
         let [name, option] = if cfg!(windows) { ["cmd", "/C"] } else { ["sh", "-c"] };
         let mut shell = Command::new(name);
-        shell.args([option, command]).stdin(Stdio::null()).stdout(Stdio::null());
+        shell.args([option, command]).stdin(Stdio::null()).stdout(Stdio::piped());
         let started = shell.stderr(Stdio::piped()).spawn();
         let mut child = match started {
             Ok(child) => child,
             Err(error) => return Some(format!("`{command}` does not start: {error}")),
         };
-        let errors = child.stderr.take();
-        let reader = thread::spawn(move || {
+        // What can be read of it is shown.
+        fn all(pipe: Option<impl Read>) -> Vec<u8> {
             let mut text = Vec::new();
-            // What can be read of it is shown.
-            let _ = errors.map(|mut errors| errors.read_to_end(&mut text));
-            String::from_utf8_lossy(&text).into_owned()
-        });
+            let _ = pipe.map(|mut pipe| pipe.read_to_end(&mut text));
+            text
+        }
+        let (output, errors) = (child.stdout.take(), child.stderr.take());
+        let output = thread::spawn(move || all(output));
+        let reader = thread::spawn(move || all(errors));
         let ended = end_of(&mut child, stop);
-        let text = reader.join().unwrap_or_default();
+        let text = [output.join().unwrap_or_default(), reader.join().unwrap_or_default()].concat();
+        let text = String::from_utf8_lossy(&text).into_owned();
         match ended {
             Some(true) => None,
             Some(false) => {
                 let start = text.char_indices().rev().nth(MOST_LETTERS).map_or(0, |(place, _)| place);
-                Some(format!(
-                    "`{command}` failed, and the levels are tested after the next save:\n{}",
-                    text[start..].trim()
-                ))
+                Some(format!("`{command}` failed, and its levels are tested when it works:\n{}", text[start..].trim()))
             }
             None => Some(format!("`{command}` was stopped")),
         }
@@ -176,7 +183,7 @@ impl Rebuilt {
         let mut child = match command.spawn() {
             Ok(child) => child,
             Err(error) => {
-                report!("{} does not start, and the levels are tested after the next save: {error}", program.display());
+                report!("{} does not start, and its levels are tested when it works: {error}", program.display());
                 return Ok(());
             }
         };
@@ -231,6 +238,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let (code, assets) = (folder.path().join("src"), folder.path().join("assets"));
         fs::create_dir_all(code.join("inner")).expect("writable");
+        fs::create_dir(&assets).expect("writable");
         let file = code.join("inner/a.rs");
         fs::write(&file, "1").expect("writable");
         let sources = Sources::new(std::slice::from_ref(&code), std::slice::from_ref(&assets), Some("true".to_owned()));
@@ -240,14 +248,15 @@ mod tests {
         fs::write(&file, "12").expect("writable");
         let second = sources.look();
         assert!(second.code != first.code && second.assets == first.assets);
-        fs::create_dir(&assets).expect("writable");
         fs::write(assets.join(".hidden"), "").expect("writable");
         fs::write(assets.join("a.ldtk"), "").expect("writable");
         assert_eq!(sources.look().assets.len(), 1);
         fs::remove_dir_all(&code).expect("it is there");
         assert!(sources.look().code.is_empty());
+        let code = Sources::new(&[folder.path().join("no-code")], &[], Some("true".to_owned())).err();
+        assert!(code.is_some_and(|error| error.to_string().contains("no-code")), "code that is not there");
         let none = Sources::new(&[], &[folder.path().join("nothing")], None).err().map(|error| error.to_string());
-        assert!(none.is_some_and(|words| words.contains("nothing can change")));
+        assert!(none.is_some_and(|words| words.contains("nothing there could change")));
     }
 
     #[test]

@@ -2,12 +2,13 @@
 
 use crate::{error::CliError, verbs::watch::changes::Stamp};
 use playbot_learner::{disk, disk::DiskFile};
-use playbot_report::{counted, ticks};
+use playbot_report::counted;
 use playbot_test::{quick::QuickVerdict, verdict::LevelOutcome};
 use serde::{Deserialize, Serialize};
 use std::{
+    collections::BTreeSet,
     fmt,
-    fs::OpenOptions,
+    fs::{OpenOptions, TryLockError},
     io::Write,
     path::{Path, PathBuf},
     time::{SystemTime, UNIX_EPOCH},
@@ -15,6 +16,12 @@ use std::{
 
 /// Name of the file that keeps the saves, one line of JSON each.
 const SAVES: &str = "saves.jsonl";
+
+/// Name of a file with lines that cannot be read.
+const DAMAGED: &str = "saves.jsonl.damaged";
+
+/// Name of the file that a watch holds.
+const LOCK: &str = "watch.lock";
 
 /// Most saves that are kept: the newest.
 const MOST: usize = 200;
@@ -96,6 +103,15 @@ impl LevelState {
     }
 }
 
+/// Returns the outcome as the page says it.
+fn in_words(outcome: LevelOutcome) -> &'static str {
+    match outcome {
+        LevelOutcome::Solved => "solved",
+        LevelOutcome::BotFailed => "not solved, nothing proved",
+        LevelOutcome::ProvedUnsolvable => "unsolvable",
+    }
+}
+
 impl fmt::Display for LevelState {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { level, verdict, before, problem, seconds, .. } = self;
@@ -108,8 +124,7 @@ impl fmt::Display for LevelState {
                 write!(f, "{level}: solved in {} by {by}", counted(count.into(), "tick"))?
             }
             (Some(LevelOutcome::Solved), None) => write!(f, "{level}: solved")?,
-            (Some(LevelOutcome::ProvedUnsolvable), _) => write!(f, "{level}: UNSOLVABLE")?,
-            (Some(LevelOutcome::BotFailed), _) => write!(f, "{level}: NOT SOLVED, nothing proved")?,
+            (Some(outcome), _) => write!(f, "{level}: {}", in_words(outcome).to_uppercase())?,
             (None, _) => write!(f, "{level}: not known")?,
         }
         if let Some(why) = &verdict.why {
@@ -118,8 +133,10 @@ impl fmt::Display for LevelState {
         let was = before.as_ref().filter(|before| before.outcome != verdict.outcome || before.ticks != verdict.ticks);
         if let Some(was) = was {
             match (was.outcome, was.ticks) {
-                (Some(LevelOutcome::Solved), Some(count)) => write!(f, " (before: {})", ticks(f64::from(count)))?,
-                (Some(outcome), _) => write!(f, " (before: {})", outcome.name())?,
+                (Some(LevelOutcome::Solved), Some(count)) => {
+                    write!(f, " (before: in {})", counted(count.into(), "tick"))?
+                }
+                (Some(outcome), _) => write!(f, " (before: {})", in_words(outcome))?,
                 (None, _) => {}
             }
         }
@@ -127,7 +144,8 @@ impl fmt::Display for LevelState {
             write!(f, "; the stored solution {stored}")?;
         }
         if let Some(places) = verdict.reached.filter(|places| places.open > 0) {
-            write!(f, "; the explorer reaches {} of {} open squares", places.visited, places.open)?;
+            let squares = counted(places.open, "square");
+            write!(f, "; the explorer reaches {} of the {squares} that no wall cuts off", places.visited)?;
         }
         if verdict.lost > 0 {
             write!(f, "; {}", counted(verdict.lost, "death"))?;
@@ -142,6 +160,8 @@ impl fmt::Display for LevelState {
 
 /// All saves, on disk and in memory.
 pub(super) struct Saves {
+    /// Held as long as the watch goes on: two of them in one folder would disturb each other.
+    _lock: Option<DiskFile>,
     folder: PathBuf,
     kept: Vec<Save>,
     last_number: u64,
@@ -149,14 +169,16 @@ pub(super) struct Saves {
 
 impl Saves {
     /// Opens the saves in a folder, or begins there. Returns what is wrong with the earlier ones, which are left out then.
+    /// A part of another watch does not ask for the folder.
     ///
     /// # Errors
     ///
-    /// The folder cannot be made.
-    pub fn open(folder: &Path) -> Result<(Self, Option<String>), CliError> {
+    /// The folder cannot be made, or another watch keeps its saves there.
+    pub fn open(folder: &Path, is_part: bool) -> Result<(Self, Option<String>), CliError> {
         let failed =
             |error: std::io::Error| CliError::Io(format!("cannot keep saves in {}: {error}", folder.display()));
         disk::create_dir_all(folder).map_err(failed)?;
+        let lock = if is_part { None } else { Some(lock(folder)?) };
         let file = folder.join(SAVES);
         let text = if file.is_file() { std::fs::read_to_string(&file).map_err(failed)? } else { String::new() };
         let (mut kept, mut damaged) = (Vec::new(), 0);
@@ -168,13 +190,19 @@ impl Saves {
         }
         let message = (damaged > 0).then(|| {
             let lines = counted(damaged, "line");
-            format!("{lines} of {} can no longer be read, and those saves are left out", file.display())
+            format!(
+                "{lines} of {} can no longer be read, and those saves are left out; the file is kept as {DAMAGED}",
+                file.display()
+            )
         });
         let last_number = kept.iter().map(|save| save.number).max().unwrap_or(0);
         let kept = kept.split_off(kept.len().saturating_sub(MOST));
-        let saves = Self { folder: folder.to_owned(), kept, last_number };
+        let saves = Self { _lock: lock, folder: folder.to_owned(), kept, last_number };
+        if damaged > 0 && !is_part {
+            disk::rename(&file, &folder.join(DAMAGED)).map_err(failed)?;
+        }
         // A file that only grows would be read for ever.
-        if text.lines().count() > 2 * MOST {
+        if (damaged > 0 || text.lines().count() > 2 * MOST) && !is_part {
             saves.write_all()?;
         }
         Ok((saves, message))
@@ -193,6 +221,16 @@ impl Saves {
     /// Returns the number of the next save.
     pub fn next(&self) -> u64 {
         self.last_number + 1
+    }
+
+    /// Returns all levels that the page still shows.
+    pub fn levels(&self) -> BTreeSet<String> {
+        let mut levels = BTreeSet::new();
+        for save in &self.kept {
+            levels.retain(|level| !save.gone.contains(level));
+            levels.extend(save.levels.iter().map(|state| state.level.clone()));
+        }
+        levels
     }
 
     /// Returns what was last known of a level.
@@ -234,6 +272,21 @@ impl Saves {
     }
 }
 
+/// Takes the folder for this watch.
+fn lock(folder: &Path) -> Result<DiskFile, CliError> {
+    let path = folder.join(LOCK);
+    let failed = |error: std::io::Error| CliError::Io(format!("cannot use {}: {error}", path.display()));
+    let file = DiskFile::open(&path, OpenOptions::new().create(true).append(true)).map_err(failed)?;
+    match file.as_file().try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(CliError::Usage(format!(
+            "{} is in use by another watch: stop it, or name another --out",
+            folder.display()
+        ))),
+        Err(TryLockError::Error(error)) => Err(failed(error)),
+    }
+}
+
 fn line(save: &Save) -> Result<String, CliError> {
     let text = serde_json::to_string(save);
     text.map(|text| format!("{text}\n"))
@@ -260,7 +313,10 @@ mod tests {
     #[test]
     fn saves_are_there_after_a_restart_and_a_torn_line_costs_one() {
         let folder = tempfile::tempdir().expect("a folder");
-        let (mut saves, message) = Saves::open(folder.path()).expect("writable");
+        let (mut saves, message) = Saves::open(folder.path(), false).expect("writable");
+        let taken = Saves::open(folder.path(), false).err().map(|error| error.to_string());
+        assert!(taken.is_some_and(|error| error.contains("is in use by another watch")));
+        assert!(Saves::open(folder.path(), true).is_ok(), "a part of it");
         assert_eq!((saves.next(), message), (1, None));
         for number in 1..=3 {
             let mut save = Save::new(number);
@@ -272,16 +328,17 @@ mod tests {
         let file = folder.path().join(SAVES);
         let text = fs::read_to_string(&file).expect("written");
         fs::write(&file, &text[..text.len() - 20]).expect("writable");
-        let (mut again, message) = Saves::open(folder.path()).expect("readable");
+        drop(saves);
+        let (mut again, message) = Saves::open(folder.path(), false).expect("readable");
         assert!(message.is_some_and(|message| message.starts_with("1 line of ")), "it says so");
         assert_eq!((again.all().len(), again.next()), (2, 3));
         assert_eq!(again.last("a.json").and_then(|before| before.ticks), Some(102));
-        again.add(Save::new(3)).expect("writable");
-        assert_eq!(
-            Saves::open(folder.path()).expect("readable").0.all().len(),
-            3,
-            "the torn line does not swallow the next"
-        );
+        assert_eq!(again.levels().len(), 1);
+        again.add(Save { gone: vec!["a.json".to_owned()], ..Save::new(3) }).expect("writable");
+        assert!(again.levels().is_empty() && folder.path().join(DAMAGED).is_file());
+        drop(again);
+        let (last, message) = Saves::open(folder.path(), false).expect("readable");
+        assert_eq!((last.all().len(), message), (3, None), "it is told once");
     }
 
     #[test]
@@ -291,12 +348,12 @@ mod tests {
             before: before(LevelOutcome::Solved, Some(130)),
             ..state("a.json", LevelOutcome::Solved, Some(123))
         };
-        assert_eq!(solved.to_string(), "a.json: solved in 123 ticks by search (before: 130) [0.25 s]");
+        assert_eq!(solved.to_string(), "a.json: solved in 123 ticks by search (before: in 130 ticks) [0.25 s]");
         let mut lost =
             LevelState { before: before(LevelOutcome::Solved, None), ..state("a.json", LevelOutcome::BotFailed, None) };
         lost.verdict.stored = Some("is lost after 40 ticks".to_owned());
         lost.verdict.lost = 2;
-        let words = "a.json: NOT SOLVED, nothing proved (before: solved); the stored solution is lost after 40 ticks; 2 deaths \
+        let words = "a.json: NOT SOLVED, NOTHING PROVED (before: solved); the stored solution is lost after 40 ticks; 2 deaths \
                      [0.25 s]";
         assert_eq!(lost.to_string(), words);
         let unreadable = LevelState::unreadable("b.json", "line 3: no rows".to_owned());

@@ -23,6 +23,8 @@
     if (state.verdict.findings.length > 0 && state.verdict.outcome === "solved") return "bot-failed";
     return state.verdict.outcome;
   };
+  // Returns the level of a save that somebody should look at first.
+  const worst = (save) => [...(save?.levels ?? [])].sort((a, b) => rank[kind(a)] - rank[kind(b)])[0];
   const rank = { broken: 0, "proved-unsolvable": 1, "bot-failed": 2, testing: 3, solved: 4 };
   const outcomes = { solved: "solved", "bot-failed": "not solved, nothing proved", "proved-unsolvable": "unsolvable" };
   const signed = (number) => (number > 0 ? `+${number}` : `−${-number}`);
@@ -95,7 +97,7 @@
     const last = shownSave ?? newest();
     const levels = levelsAfter(last);
     const save = saves.get(last);
-    const changed = save?.levels.at(-1)?.level;
+    const changed = worst(save)?.level;
     const current = levels.has(shownLevel) ? shownLevel : levels.has(changed) ? changed : levels.keys().next().value;
     const all = [...levels.values()];
     order = all.sort((a, b) => rank[kind(a)] - rank[kind(b)] || a.level.localeCompare(b.level, undefined, { numeric: true }));
@@ -110,23 +112,24 @@
       return entry;
     }));
     const bad = all.filter((state) => kind(state) !== "solved" && kind(state) !== "testing").length;
-    const counts = `${plural(all.length, "level")}, ${bad === 0 ? "all well" : `${bad} to look at`}`;
-    get("counts").textContent = counts;
-    document.title = bad === 0 ? `✓ ${title}` : `✗ ${bad} ${title}`;
+    const isWell = bad === 0 && all.length > 0 && !save?.problem;
+    get("counts").textContent = `${plural(all.length, "level")}, ${isWell ? "all well" : save?.problem ? "with a problem" : `${bad} to look at`}`;
+    document.title = isWell ? `✓ ${title}` : `✗ ${bad > 0 ? `${bad} ` : ""}${title}`;
     get("problem").textContent = save?.problem ?? "";
     get("problem").hidden = !save?.problem;
     const list = [...saves.values()].sort((a, b) => b.number - a.number);
     replace(get("saves-list"), list.map((one) => {
       const time = new Date(one.at).toLocaleTimeString();
       const what = one.problem ? "problem" : [...one.levels.map((state) => state.level), ...(one.gone ?? []).map((level) => `${level} gone`)];
-      const small = Array.isArray(what) ? (what.length > 2 ? plural(what.length, "level") : what.join(", ")) : what;
+      const gone = one.gone?.length > 0 && one.levels.length === 0 ? " gone" : "";
+      const small = Array.isArray(what) ? (what.length > 2 ? `${plural(what.length, "level")}${gone}` : what.join(", ")) : what;
       const [entry, button] = item(`${one.number}, ${time}`, small, one.number === last, () => {
         shownSave = one.number === newest() ? null : one.number;
-        shownLevel = one.levels.at(-1)?.level ?? shownLevel;
+        shownLevel = worst(one)?.level ?? shownLevel;
         draw();
       });
-      const worst = one.levels.map(kind).sort((a, b) => rank[a] - rank[b])[0];
-      button.classList.add(one.problem ? "broken" : worst ?? "testing");
+      const shown = worst(one);
+      button.classList.add(one.problem ? "broken" : shown ? kind(shown) : "testing");
       return entry;
     }));
     get("latest").hidden = shownSave === null && shownLevel === null;
@@ -134,7 +137,15 @@
   };
   const show = (state) => {
     get("shown").dataset.kind = state ? kind(state) : "";
-    if (!state) return;
+    if (!state) {
+      get("name").textContent = "No level";
+      for (const id of ["verdict", "more", "took"]) get(id).textContent = "";
+      for (const id of ["picture", "findings"]) get(id).replaceChildren();
+      get("picture").dataset.now = "";
+      get("legend").hidden = true;
+      return;
+    }
+    get("legend").hidden = false;
     get("name").textContent = state.level;
     get("verdict").textContent = headline(state);
     get("more").textContent = more(state);
@@ -179,14 +190,23 @@
       const at = numbers.indexOf(shownSave ?? newest());
       const wanted = numbers[Math.min(Math.max(at + turn, 0), numbers.length - 1)];
       shownSave = wanted === newest() ? null : wanted;
+      // The level that changed then, as after a click.
+      shownLevel = null;
     } else return;
     event.preventDefault();
     draw();
   });
 
   const events = new EventSource("/events");
-  events.addEventListener("open", () => { get("link").textContent = ""; });
-  events.addEventListener("error", () => { get("link").textContent = "The watch has ended or is busy; waiting for it."; });
+  events.addEventListener("open", () => {
+    get("link").textContent = "";
+    document.body.classList.remove("ended");
+  });
+  events.addEventListener("error", () => {
+    get("link").textContent = "The watch has ended: start it again, and this page goes on.";
+    document.title = `⚠ ${title}`;
+    document.body.classList.add("ended");
+  });
   events.addEventListener("all", (event) => {
     saves.clear();
     for (const save of JSON.parse(event.data)) saves.set(save.number, save);
