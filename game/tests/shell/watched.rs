@@ -56,7 +56,7 @@ impl Watch {
             let data: Value = serde_json::from_str(data).expect("JSON");
             let saves = data.as_array().cloned().unwrap_or_else(|| vec![data]);
             let states = saves.iter().flat_map(|save| save["levels"].as_array().cloned().unwrap_or_default());
-            let state = states.filter(|state| state["level"] == level && state["verdict"]["is_final"] == true).last();
+            let state = states.rev().find(|state| state["level"] == level && state["verdict"]["is_final"] == true);
             if let Some(state) = state {
                 return state;
             }
