@@ -333,7 +333,7 @@ impl Watch<'_> {
             if interrupt::asked() {
                 return self.stopped();
             }
-            let layout = self.game.layout(&split.mode, split.first).map(|layout| format!("{layout:016x}"));
+            let layout = self.layout(&split);
             if layout.as_ref().is_some_and(|layout| known.is_some_and(|known| known.contains(layout))) {
                 continue;
             }
@@ -352,6 +352,11 @@ impl Watch<'_> {
         Ok(if is_sound { Outcome::Pass } else { Outcome::Findings })
     }
 
+    /// Returns the hash of a level's layout, if it has one.
+    fn layout(&self, level: &LevelSplit) -> Option<String> {
+        self.game.layout(&level.mode, level.first).map(|layout| format!("{layout:016x}"))
+    }
+
     /// Tests a level, and notes what is found. Returns false if it was stopped.
     fn level(
         &mut self,
@@ -364,7 +369,7 @@ impl Watch<'_> {
         let before = self.saves.last(name);
         // In a script the verdict is not to depend on what was found before.
         let solution = if self.asks_stored { self.solutions.of(name) } else { None };
-        let layout = self.game.layout(&split.mode, split.first).map(|layout| format!("{layout:016x}"));
+        let layout = self.layout(split);
         let state = |verdict: &QuickVerdict| LevelState {
             level: name.to_owned(),
             seconds: begin.elapsed().as_secs_f64(),

@@ -57,13 +57,12 @@ impl Pictures<'_> {
             return Ok(());
         }
         let seen_as = seen_as(game);
-        let (steps, reach) = play(game, finding, &seen_as)?;
+        let bar = progress::bar("play", finding.episode.len() as u64, "ticks");
+        let played = play(game, finding, &seen_as, MOST_TICKS, &mut |_, _| bar.inc(1));
+        bar.finish_and_clear();
+        let (steps, reach) = played?;
         let Some(last) = steps.last() else { return self.write_level(game, finding) };
-        let film = if seen_as.is_image() {
-            Film::new(seen_as.image, self.scale, game.tick_hz())?
-        } else {
-            Film::of_numbers(NumberBars::new(game.observation().names, self.scale, &reach), game.tick_hz())
-        };
+        let film = film(game, &seen_as, self.scale, &reach)?;
         if let Some(path) = self.still {
             output::write(path, &film.captioned(last)?.0)?;
             report!("{} shows tick {}", path.display(), last.tick);
@@ -109,31 +108,48 @@ pub(crate) fn seen_as(game: &dyn Game) -> ObservationConfig {
     if game.tools().pictures.has_camera() && camera.check(game).is_ok() { camera } else { of(ObservationKind::Vector) }
 }
 
-/// Plays the last ticks up to the finding. A game that breaks ends it.
-fn play(
+/// Returns the film of a game in these pictures, or of its numbers, enlarged.
+///
+/// # Errors
+///
+/// The pictures are too large.
+pub(crate) fn film(game: &dyn Game, seen_as: &ObservationConfig, scale: u32, reach: &Reach) -> Result<Film, CliError> {
+    if seen_as.is_image() {
+        return Film::new(seen_as.image, scale, game.tick_hz());
+    }
+    Ok(Film::of_numbers(NumberBars::new(game.observation().names, scale, reach), game.tick_hz()))
+}
+
+/// Plays the last ticks up to the finding, `most` at most, and calls `each` after each tick that is played. A game that
+/// breaks ends it.
+///
+/// # Errors
+///
+/// The pictures cannot be made.
+pub(crate) fn play(
     game: &dyn Game,
     finding: &StoredFinding,
     seen_as: &ObservationConfig,
+    most: usize,
+    each: &mut dyn FnMut(&EpisodeWorld, &EpisodeStep),
 ) -> Result<(Vec<EpisodeStep>, Reach), CliError> {
     let mut world = EpisodeWorld::replaying(game, &finding.header.mode, seen_as, finding.episode.clone())?;
     world.keep_no_panic_files();
     let (mut steps, mut reach) = (VecDeque::new(), Reach::default());
-    let bar = progress::bar("play", finding.episode.len() as u64, "ticks");
     loop {
         match world.next() {
             Ok(Some(step)) => {
                 reach.include(&step.vector);
+                each(&world, &step);
                 steps.push_back(step);
-                if steps.len() > MOST_TICKS {
+                if steps.len() > most {
                     steps.pop_front();
                 }
-                bar.inc(1);
             }
             Ok(None) => break,
             Err(error) if error.is::<Fault>() => break,
             Err(error) => return Err(error),
         }
     }
-    bar.finish_and_clear();
     Ok((steps.into(), reach))
 }

@@ -2,19 +2,12 @@
 
 use crate::{
     error::CliError,
-    pictures::{
-        Film,
-        caption::{NumberBars, Reach},
-        episode_world::{EpisodeStep, EpisodeWorld},
-    },
+    pictures::episode_world::EpisodeStep,
     progress,
     progress::interrupt,
-    verbs::replay::picture::seen_as,
+    verbs::replay::picture::{film, play, seen_as},
 };
-use bevy_playbot::{
-    fault::Fault,
-    vision::{ObservationConfig, ObservationKind},
-};
+use bevy_playbot::vision::{ObservationConfig, ObservationKind};
 use indicatif::ProgressBar;
 use playbot_harness::game::Game;
 use playbot_test::{
@@ -23,7 +16,6 @@ use playbot_test::{
 };
 use std::{
     cell::{Cell, OnceCell},
-    collections::VecDeque,
     path::Path,
 };
 
@@ -41,6 +33,9 @@ const MOST_CAMERAS: usize = 12;
 
 /// Length of the longer side of a picture, pixels.
 const LENGTH: u32 = 192;
+
+/// Enlargement of numbers, of a game without pictures.
+const NUMBERS: u32 = 2;
 
 /// Draws the scenes of a page.
 pub(crate) struct SceneMaker<'a> {
@@ -76,42 +71,27 @@ impl<'a> SceneMaker<'a> {
 
     fn draw(&self, finding: &StoredFinding) -> Result<Option<FindingScene>, CliError> {
         let Self { game, seen_as, .. } = self;
-        let mode = &finding.header.mode;
-        let mut world = EpisodeWorld::replaying(*game, mode, seen_as, finding.episode.clone())?;
-        world.keep_no_panic_files();
         let most = ((SECONDS * game.tick_hz()) as usize).clamp(2, MOST_TICKS);
-        let (mut steps, mut ticks, mut reach) = (VecDeque::new(), VecDeque::new(), Reach::default());
-        loop {
-            match world.next() {
-                Ok(Some(step)) => {
-                    self.played.set(self.played.get() + 1);
-                    reach.include(&step.vector);
-                    let position = world.position(*game).map(|position| position.to_array());
-                    let EpisodeStep { tick, action, reward, .. } = &step;
-                    ticks.push_back(SceneTick { tick: *tick, action: action.clone(), reward: *reward, position });
-                    steps.push_back(step);
-                    if steps.len() > most {
-                        steps.pop_front();
-                        ticks.pop_front();
-                    }
-                }
-                Ok(None) => break,
-                // That is the finding.
-                Err(error) if error.is::<Fault>() => break,
-                Err(error) => return Err(error),
-            }
-        }
-        let steps: Vec<EpisodeStep> = steps.into();
+        let mut positions = Vec::new();
+        let (steps, reach) = play(*game, finding, seen_as, most, &mut |world, _| {
+            positions.push(world.position(*game).map(|position| position.to_array()));
+        })?;
+        self.played.set(self.played.get() + positions.len());
         let Some(last) = steps.last() else { return Ok(None) };
-        let film = if seen_as.is_image() {
-            let longest = seen_as.image.width.max(seen_as.image.height);
-            Film::new(seen_as.image, (LENGTH / longest).max(1), game.tick_hz())?
-        } else {
-            Film::of_numbers(NumberBars::new(game.observation().names, 2, &reach), game.tick_hz())
+        let last_positions = &positions[positions.len() - steps.len()..];
+        let tick = |(step, position): (&EpisodeStep, &Option<[f32; 2]>)| SceneTick {
+            tick: step.tick,
+            action: step.action.clone(),
+            reward: step.reward,
+            position: *position,
         };
+        let ticks = steps.iter().zip(last_positions).map(tick).collect();
+        let scale =
+            if seen_as.is_image() { (LENGTH / seen_as.image.width.max(seen_as.image.height)).max(1) } else { NUMBERS };
+        let film = film(*game, seen_as, scale, &reach)?;
         let (still, _) = film.captioned(last)?;
         let (moving, _) = film.animated(&steps, || {})?;
-        Ok(Some(FindingScene { still, moving, ticks: ticks.into() }))
+        Ok(Some(FindingScene { still, moving, ticks }))
     }
 }
 

@@ -1,6 +1,6 @@
 //! The saves of a watch, and what was found after each: in memory, on disk, and in words.
 
-use crate::{error::CliError, verbs::watch::changes::Stamp};
+use crate::error::CliError;
 use playbot_learner::{disk, disk::DiskFile};
 use playbot_report::counted;
 use playbot_test::{quick::QuickVerdict, verdict::LevelOutcome};
@@ -201,8 +201,9 @@ impl Saves {
         if damaged > 0 && !is_part {
             disk::rename(&file, &folder.join(DAMAGED)).map_err(failed)?;
         }
-        // A file that only grows would be read for ever.
-        if (damaged > 0 || text.lines().count() > 2 * MOST) && !is_part {
+        // A file that only grows would be read for ever, and what is added must begin a line.
+        let is_torn = !text.is_empty() && !text.ends_with('\n');
+        if (damaged > 0 || is_torn || text.lines().count() > 2 * MOST) && !is_part {
             saves.write_all()?;
         }
         Ok((saves, message))
@@ -249,11 +250,9 @@ impl Saves {
     pub fn add(&mut self, save: Save) -> Result<(), CliError> {
         let line = line(&save)?;
         let path = self.folder.join(SAVES);
-        let begins_a_line = Stamp::of(&path).is_none() || std::fs::read(&path).is_ok_and(|text| text.ends_with(b"\n"));
-        let begin = if begins_a_line { "" } else { "\n" };
         let append = || {
             let mut file = DiskFile::open(&path, OpenOptions::new().create(true).append(true))?;
-            file.write_all(format!("{begin}{line}").as_bytes())
+            file.write_all(line.as_bytes())
         };
         append().map_err(|error| CliError::Io(format!("cannot write {}: {error}", path.display())))?;
         self.last_number = self.last_number.max(save.number);

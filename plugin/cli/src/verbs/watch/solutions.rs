@@ -5,6 +5,7 @@ use bevy_playbot::{
     action::ActionValue,
     demo::file::{DemoReader, DemoWriter},
     engine::recorded_action,
+    state_hash::StateHash,
 };
 use playbot_harness::{game::Game, split::LevelSplit};
 use playbot_learner::{Actions, disk};
@@ -72,9 +73,7 @@ impl<'a> Solutions<'a> {
         let plain: String =
             level.chars().map(|letter| if letter.is_ascii_alphanumeric() { letter } else { '-' }).collect();
         let plain = &plain[plain.len().saturating_sub(60)..];
-        let hash = level
-            .bytes()
-            .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3));
-        self.folder.join(format!("{plain}-{:08x}.demo", hash as u32))
+        let hash = StateHash::of(level.bytes().map(u64::from)).folded();
+        self.folder.join(format!("{plain}-{hash:08x}.demo"))
     }
 }

@@ -1,6 +1,7 @@
 //! Issues of levels, in the forms that build servers and editors read.
 
 use crate::verdict::{Finding, LevelOutcome, LevelVerdict, ResultLines, error::TestError, reports::failure};
+use bevy_playbot::state_hash::StateHash;
 use playbot_harness::level_files::is_level_files;
 use serde_json::{Value, json};
 use std::{collections::BTreeSet, path::Path};
@@ -94,12 +95,11 @@ fn of_level(game: &str, is_files: bool, level: &LevelVerdict) -> Vec<Issue> {
     issues
 }
 
-/// Returns a hash of some words (FNV-1a).
+/// Returns a hash of some words.
 fn fingerprint(words: &[&str]) -> String {
-    let bytes = words.iter().flat_map(|word| word.bytes().chain([0]));
-    let hash =
-        bytes.fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3));
-    format!("{hash:016x}")
+    // No byte is as large as what stands between two words.
+    let bytes = words.iter().flat_map(|word| word.bytes().map(u64::from).chain([u64::MAX]));
+    format!("{:016x}", StateHash::of(bytes).0)
 }
 
 /// Returns a path as a URI reference: what is no letter, digit or mark is escaped.
