@@ -101,9 +101,12 @@ pub mod fault;
 pub mod headless;
 pub mod key_bindings;
 pub mod legal;
+pub mod lesson;
 pub mod level;
 mod loading;
 pub mod observation;
+#[cfg(feature = "overlay")]
+pub mod overlay;
 mod panics;
 pub mod placement;
 pub mod plugin;

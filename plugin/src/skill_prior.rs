@@ -30,6 +30,7 @@ use crate::{
 };
 use bevy::prelude::*;
 use playbot_learner::{ObsKind, Observations, Prior, SkillDraw, SkillSource};
+use serde::{Deserialize, Serialize};
 
 /// Draws a skill z from p(z | s) for each agent at the first tick of an episode and then every
 /// `skill_interval` fixed ticks (the paper's T). Each agent has its own count.
@@ -68,6 +69,44 @@ impl ActiveSkill {
     // Hidden: for rollouts.
     pub fn left(&self, skill_interval: u32) -> f32 {
         if self.ticks_left == 0 { 1.0 } else { self.ticks_left as f32 / skill_interval.max(1) as f32 }
+    }
+}
+
+/// A region of skills with a name: all within a distance of its middle.
+///
+/// ```
+/// use bevy_playbot::skill_prior::NamedSkill;
+///
+/// let region = |name: &str, z: [f32; 2]| NamedSkill { name: name.into(), z: z.to_vec(), radius: 0.5 };
+/// let regions = [region("jump", [0.0, 0.8]), region("walk", [0.0, 0.2])];
+/// assert_eq!(NamedSkill::name_of(&regions, &[0.1, 0.6]), Some("jump"));
+/// assert_eq!(NamedSkill::name_of(&regions, &[0.1, -0.9]), None);
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Reflect)]
+pub struct NamedSkill {
+    /// The name.
+    pub name: String,
+    /// Its middle.
+    pub z: Vec<f32>,
+    /// Largest distance from the middle.
+    pub radius: f32,
+}
+
+impl NamedSkill {
+    /// Returns whether a skill lies in the region.
+    pub fn holds(&self, z: &[f32]) -> bool {
+        self.z.len() == z.len() && self.distance(z) <= self.radius
+    }
+
+    /// Returns the name of the region in which a skill lies; of several, that with the nearest middle.
+    pub fn name_of<'a>(regions: &'a [Self], z: &[f32]) -> Option<&'a str> {
+        let holding = regions.iter().filter(|region| region.holds(z));
+        let nearest = holding.min_by(|one, other| one.distance(z).total_cmp(&other.distance(z)));
+        nearest.map(|region| region.name.as_str())
+    }
+
+    fn distance(&self, z: &[f32]) -> f32 {
+        self.z.iter().zip(z).map(|(one, other)| (one - other) * (one - other)).sum::<f32>().sqrt()
     }
 }
 

@@ -4,8 +4,6 @@
 //! A game with [`PlaybotPlugins`](crate::plugin::PlaybotPlugins) reads the environment variable
 //! `PLAYBOT` when it starts:
 //!
-//! `play`, the only file of the folder, has the three takeovers, and the former players of the agents.
-//!
 //! ```text
 //! PLAYBOT=record:ada.demo ./game       record every episode of the agents that play
 //! PLAYBOT=policy:walker.policy ./game  a policy plays instead
@@ -16,6 +14,16 @@
 //! starts a recording named for the game. An existing recording is continued, and
 //! [`merge_demos`](crate::demo::file::merge_demos) joins those of many testers. `PLAYBOT_NAME`
 //! names the player.
+//!
+//! F10 learns from the recording, in another program, and Tab hands over to what it has learned so far: set
+//! `PLAYBOT_TEACH` to the program with playbot's verbs and this game, see [`lesson`](crate::lesson). It plays better
+//! while you watch.
+//!
+//! ```text
+//! PLAYBOT_TEACH=target/release/bots ./game   F9 records you, F10 learns from it, Tab hands over
+//! ```
+//!
+//! The folder: `play` has the three takeovers and the former players of the agents, `teach` has the lesson.
 //!
 //! An impossible request triggers a [`FaultOccurred`](crate::fault::FaultOccurred), and the game
 //! goes on unchanged. A World that is ticked by hand, as in training, cannot be taken over.
@@ -30,6 +38,7 @@
 //! ```
 
 mod play;
+mod teach;
 
 use crate::{
     demo::file::DemoFileError,
@@ -43,6 +52,8 @@ use bevy::{input::InputSystems, prelude::*};
 use playbot_learner::FileError;
 use std::{fmt, path::PathBuf, str::FromStr};
 use thiserror::Error;
+
+pub use crate::takeover::teach::{TeachOptions, Teaching};
 
 /// The environment variable that holds the request.
 const VARIABLE: &str = "PLAYBOT";
@@ -59,13 +70,16 @@ pub struct TakeoverPlugin {
     pub key: Option<KeyCode>,
     /// The request at the start. [`new`](Self::new) reads it from the environment.
     pub request: Option<Result<TakeoverRequest, RequestError>>,
+    /// The program that learns from the recording, and its keys.
+    pub teach: TeachOptions,
 }
 
 impl TakeoverPlugin {
     /// Creates the plugin for this game, with F9 and the request of the environment.
     pub fn new(game: GameIdentity) -> Self {
         let request = std::env::var_os(VARIABLE).filter(|text| !text.is_empty());
-        Self { game, key: Some(KeyCode::F9), request: request.map(|text| text.to_string_lossy().parse()) }
+        let request = request.map(|text| text.to_string_lossy().parse());
+        Self { game, key: Some(KeyCode::F9), request, teach: TeachOptions::default() }
     }
 
     /// Sets the request at the start, in place of the environment's.
@@ -83,11 +97,24 @@ impl Plugin for TakeoverPlugin {
             Some(Err(error)) => (recording, false, Some(error)),
             None => (recording, false, None),
         };
+        let recorded = match &request {
+            TakeoverRequest::Record(path) => Some(path.clone()),
+            TakeoverRequest::Policy(_) | TakeoverRequest::Replay(_) => None,
+        };
         app.insert_resource(self.game.clone())
-            .insert_resource(Takeover { request, key: self.key, is_wanted, error, running: Running::Nothing })
+            .insert_resource(Teaching::new(self.teach.clone()))
+            .insert_resource(Takeover {
+                first: request.clone(),
+                request,
+                recording: recorded,
+                key: self.key,
+                is_wanted,
+                error,
+                running: Running::Nothing,
+            })
             // Runs before keys are noted, so that the person's keys no longer act in the frame of
             // the takeover.
-            .add_systems(PreUpdate, (hear_key, take_over).chain().after(InputSystems).before(note_taps))
+            .add_systems(PreUpdate, (hear_key, teach::teach, take_over).chain().after(InputSystems).before(note_taps))
             .add_systems(
                 Last,
                 // Errors of the last episode are still reported.
@@ -101,6 +128,10 @@ impl Plugin for TakeoverPlugin {
 #[reflect(Resource)]
 pub struct Takeover {
     request: TakeoverRequest,
+    /// The request of the key.
+    first: TakeoverRequest,
+    /// The recording that a lesson learns from, if the key records.
+    recording: Option<PathBuf>,
     key: Option<KeyCode>,
     /// True if it is to go on.
     is_wanted: bool,
@@ -120,6 +151,10 @@ impl Takeover {
     /// Returns whether it is running.
     pub fn is_running(&self) -> bool {
         !matches!(self.running, Running::Nothing)
+    }
+
+    fn is_recording(&self) -> bool {
+        matches!(self.running, Running::Recording)
     }
 
     /// Starts a request, in place of the running one, as soon as an agent plays.
@@ -146,7 +181,10 @@ enum Running {
 fn hear_key(keys: Option<Res<ButtonInput<KeyCode>>>, mut takeover: ResMut<Takeover>) {
     let Some(key) = takeover.key else { return };
     if keys.is_some_and(|keys| keys.just_pressed(key)) {
-        takeover.is_wanted = !takeover.is_wanted;
+        // A policy may have taken over since.
+        let is_first = takeover.request == takeover.first;
+        takeover.is_wanted = !(is_first && takeover.is_wanted);
+        takeover.request = takeover.first.clone();
     }
 }
 
@@ -226,7 +264,7 @@ fn stop(world: &mut World) {
 
 /// Finishes a recording when the game ends.
 fn finish(world: &mut World) {
-    if matches!(world.resource::<Takeover>().running, Running::Recording) {
+    if world.resource::<Takeover>().is_recording() {
         world.resource_mut::<Takeover>().is_wanted = false;
         stop(world);
     }

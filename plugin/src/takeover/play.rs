@@ -28,6 +28,25 @@ use std::{
 
 /// Hands the playing agents over to a policy, and returns the seats of their former players.
 pub(super) fn start(world: &mut World, path: &Path) -> Result<Vec<Seat>, TakeoverError> {
+    let agents = install(world, path)?;
+    let seats: Vec<Seat> = agents.iter().filter_map(|&agent| Seat::of(world, agent)).collect();
+    for agent in agents {
+        world.entity_mut(agent).insert(Control::Policy);
+        forget_skill(world, agent);
+    }
+    Ok(seats)
+}
+
+/// Replaces the policy that plays by a newer one.
+pub(super) fn reload(world: &mut World, path: &Path) -> Result<(), TakeoverError> {
+    for agent in install(world, path)? {
+        forget_skill(world, agent);
+    }
+    Ok(())
+}
+
+/// Installs a policy, and returns the agents that play.
+fn install(world: &mut World, path: &Path) -> Result<Vec<Entity>, TakeoverError> {
     let file = PolicyFile::load(path, DeviceKind::default())?;
     let agents = playing_agents(world);
     let mut games = agents.iter().filter_map(|&agent| metadata(world, agent));
@@ -35,12 +54,7 @@ pub(super) fn start(world: &mut World, path: &Path) -> Result<Vec<Seat>, Takeove
         return Err(TakeoverError::Misfit { path: path.to_owned(), why: why.to_string() });
     }
     install_policy(world, &file, ActionDraw::default());
-    let seats: Vec<Seat> = agents.iter().filter_map(|&agent| Seat::of(world, agent)).collect();
-    for agent in agents {
-        world.entity_mut(agent).insert(Control::Policy);
-        forget_skill(world, agent);
-    }
-    Ok(seats)
+    Ok(agents)
 }
 
 /// Gives the agents back.
@@ -160,6 +174,11 @@ pub(super) fn start_recording(world: &mut World, path: &Path) -> Result<(), Take
         }
     }
     Ok(())
+}
+
+/// Writes what was played of the running episodes, for a lesson. They are recorded again from their next ones on.
+pub(super) fn flush_recording(world: &mut World) -> Result<(), TakeoverError> {
+    Ok(flush_unfinished(world)?)
 }
 
 /// Ends the recording. Unfinished episodes are kept as aborted.

@@ -13,6 +13,7 @@
 //! - [`train_run`]: a whole run ([`train_run::Training`]), with its folder ([`run_dir`]), checkpoints
 //!   ([`checkpoint`]), metrics ([`metrics_log`], [`tensorboard`]) and observer ([`run_observer`]).
 //! - [`policy_export`]: the one file that a game ships with.
+//! - [`lesson`]: from a recording to a policy that plays at once, and gets better.
 //! - [`runs`]: runs on disk, found and compared over seeds.
 //! - [`study`] and [`study_runner`]: variants of an experiment, each with every seed, and their tables.
 
@@ -22,6 +23,7 @@ pub mod demo;
 mod error;
 pub mod experiment;
 pub mod learn_skills;
+pub mod lesson;
 pub mod metrics_log;
 pub mod pipeline;
 pub mod policy_export;

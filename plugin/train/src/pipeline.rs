@@ -56,7 +56,7 @@ use playbot_harness::{
     mode::ModeError,
     split::LevelSplit,
 };
-use playbot_learner::{FileError, PolicyFile, SeenLevels, SkillModel};
+use playbot_learner::{FileError, HasExitCode, PolicyFile, SeenLevels, SkillModel};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -112,6 +112,25 @@ pub enum PipelineError {
     /// Failure of the evaluation.
     #[error(transparent)]
     Eval(#[from] EvalError),
+}
+
+impl HasExitCode for PipelineError {
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::NoDemonstrator(_) | Self::OtherSettings { .. } => 3,
+            Self::Mode(error) => error.exit_code(),
+            Self::Experiment(error) => error.exit_code(),
+            Self::Demo(error) => error.exit_code(),
+            Self::Recordings(error) => error.exit_code(),
+            Self::Fault(error) => error.exit_code(),
+            Self::Skills(error) => error.exit_code(),
+            Self::Model(error) => error.exit_code(),
+            Self::Run(error) => error.exit_code(),
+            Self::Training(error) => error.exit_code(),
+            Self::Stopped(_) => 130,
+            Self::Eval(error) => error.exit_code(),
+        }
+    }
 }
 
 impl From<RecordingsError> for PipelineError {

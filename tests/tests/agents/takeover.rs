@@ -5,7 +5,7 @@ use std::{path::Path, time::Duration};
 use bevy::{
     input::{
         ButtonState, InputPlugin,
-        keyboard::{Key, KeyboardInput},
+        keyboard::{Key, KeyboardInput, NativeKey},
     },
     prelude::*,
     time::{TimePlugin, TimeUpdateStrategy},
@@ -17,7 +17,7 @@ use bevy_playbot::{
     fault::FaultOccurred,
     headless::set_fixed_step,
     prelude::*,
-    takeover::{GameIdentity, Takeover, TakeoverPlugin, TakeoverRequest},
+    takeover::{GameIdentity, Takeover, TakeoverPlugin, TakeoverRequest, TeachOptions, Teaching},
 };
 use playbot_learner::{
     DeviceKind, Learner as _, ObsKind, PolicyFile, PolicyMetadata, PolicySpec, PpoConfig, PpoLearner,
@@ -47,7 +47,12 @@ fn corridor() -> GameIdentity {
 }
 
 fn plugin(request: Option<TakeoverRequest>) -> TakeoverPlugin {
-    TakeoverPlugin { game: corridor(), key: Some(KeyCode::F9), request: request.map(Ok) }
+    TakeoverPlugin {
+        game: corridor(),
+        key: Some(KeyCode::F9),
+        request: request.map(Ok),
+        teach: TeachOptions { program: Vec::new(), ..TeachOptions::default() },
+    }
 }
 
 fn frames(app: &mut App, n: u32) {
@@ -55,8 +60,12 @@ fn frames(app: &mut App, n: u32) {
 }
 
 fn press_key(app: &mut App) {
+    press(app, KeyCode::F9);
+}
+
+fn press(app: &mut App, key_code: KeyCode) {
     for state in [ButtonState::Pressed, ButtonState::Released] {
-        let (key_code, logical_key, window) = (KeyCode::F9, Key::F9, Entity::PLACEHOLDER);
+        let (logical_key, window) = (Key::Unidentified(NativeKey::Unidentified), Entity::PLACEHOLDER);
         app.world_mut().write_message(KeyboardInput {
             key_code,
             logical_key,
@@ -226,6 +235,63 @@ fn what_cannot_be_done_is_said_and_the_game_goes_on() {
     let (mut app, _) = build(wrong);
     frames(&mut app, 6);
     assert!(heard(&app)[0].contains("did you mean `record`?"), "{:?}", heard(&app));
+}
+
+/// A program that learns at once what lies in a file, and goes on until it is asked to stop.
+#[cfg(unix)]
+#[test]
+fn what_was_learned_from_a_recording_takes_over_and_gives_back() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (recording, learned) = (folder.path().join("ada.demo"), policy(folder.path(), metadata(), 2));
+    let news = format!(
+        r#"{{"event":"policy","file":"{}","stage":"imitation","steps":0,"mean_return":null}}"#,
+        learned.display()
+    );
+    let script = format!("echo '{news}'; cat > /dev/null; echo '{{\"event\":\"stopped\"}}'");
+    let program = ["sh", "-c", &script].map(str::to_owned).to_vec();
+    let teach = TeachOptions { program, ..TeachOptions::default() };
+    let (mut app, agent) = build(TakeoverPlugin { teach, ..plugin(Some(TakeoverRequest::Record(recording.clone()))) });
+    let words = |app: &App| app.world().resource::<Teaching>().words().unwrap_or_default().to_owned();
+    press(&mut app, KeyCode::F10);
+    assert!(words(&app).contains("nothing is recorded yet"), "{}", words(&app));
+    press(&mut app, KeyCode::Tab);
+    frames(&mut app, 8);
+    assert_eq!(app.world().get::<Control>(agent), Some(&Control::Human), "there is no policy yet");
+    press(&mut app, KeyCode::F10);
+    while app.world().resource::<Teaching>().learned().is_none() {
+        app.update();
+    }
+    assert_eq!(words(&app), "learned by imitation");
+    press(&mut app, KeyCode::Tab);
+    frames(&mut app, 3);
+    assert_eq!(app.world().get::<Control>(agent), Some(&Control::Policy));
+    press(&mut app, KeyCode::Tab);
+    frames(&mut app, 3);
+    assert_eq!(app.world().get::<Control>(agent), Some(&Control::Human));
+    // The key records again, whatever took over in between.
+    press_key(&mut app);
+    frames(&mut app, 3);
+    let takeover = app.world().resource::<Takeover>();
+    assert_eq!((takeover.is_running(), takeover.request()), (true, &TakeoverRequest::Record(recording.clone())));
+    press(&mut app, KeyCode::F10);
+    while words(&app) != "stopped and saved" {
+        app.update();
+    }
+    assert!(recorded(&recording).len() > 2);
+    assert!(heard(&app).is_empty(), "{:?}", heard(&app));
+}
+
+/// Without a program nothing is learned, and the game goes on.
+#[test]
+fn a_game_without_a_program_says_what_is_missing() {
+    let (mut app, agent) = build(plugin(None));
+    frames(&mut app, 3);
+    press(&mut app, KeyCode::F10);
+    let words = app.world().resource::<Teaching>().words().map(str::to_owned);
+    assert!(words.as_deref().is_some_and(|words| words.contains("PLAYBOT_TEACH")), "{words:?}");
+    frames(&mut app, 3);
+    assert_eq!(app.world().get::<Control>(agent), Some(&Control::Human));
+    assert!(heard(&app).is_empty(), "{:?}", heard(&app));
 }
 
 /// Set for the child of the test below.
