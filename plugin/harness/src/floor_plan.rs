@@ -57,8 +57,28 @@ impl FloorPlan {
     /// assert_eq!(plan.rows(), ["S..G", "##.#"]);
     /// ```
     pub fn rows(&self) -> Vec<String> {
-        let (min, size) = (self.bounds.min, self.bounds.size());
-        let side = (size.max_element() / LETTERS).max(1.0);
+        self.rows_with_path(&[])
+    }
+
+    /// Returns the plan as [`rows`](Self::rows) does, with a path in it: `*` where it leads through free cells and over
+    /// platforms, and `X` at its end. Positions outside the plan are left out.
+    ///
+    /// ```
+    /// # use bevy::math::{Rect, Vec2};
+    /// # use playbot_harness::floor_plan::FloorPlan;
+    /// # let plan = FloorPlan {
+    /// #     bounds: Rect::new(0.0, 0.0, 4.0, 2.0),
+    /// #     walls: vec![Rect::new(0.0, 0.0, 2.0, 1.0), Rect::new(3.0, 0.0, 4.0, 1.0)],
+    /// #     start: Vec2::new(0.5, 1.5),
+    /// #     goal: Vec2::new(3.5, 1.5),
+    /// #     ..FloorPlan::default()
+    /// # };
+    /// assert_eq!(plan.rows_with_path(&[plan.start, Vec2::new(2.5, 1.5), Vec2::new(2.5, 0.5)]), ["S**G", "##X#"]);
+    /// ```
+    pub fn rows_with_path(&self, positions: &[Vec2]) -> Vec<String> {
+        /// Longest step between two positions that is drawn as a line, in letters: beyond it the agent was put elsewhere.
+        const LONGEST_STEP: f32 = 4.0;
+        let (min, size, side) = (self.bounds.min, self.bounds.size(), self.letter());
         // A plan may be smaller than a letter, or have no bounds.
         let count = |length: f32| (length / side).ceil().clamp(1.0, LETTERS) as usize;
         let (columns, rows) = (count(size.x), count(size.y));
@@ -73,16 +93,29 @@ impl FloorPlan {
                 }
             }
         }
-        for (at, letter) in [(self.start, 'S'), (self.goal, 'G')] {
+        let mut set = |at: Vec2, letter: char| {
             let cell = ((at - min) / side).floor();
             if cell.cmpge(Vec2::ZERO).all()
                 && let Some(row) = letters.get_mut(cell.y as usize)
-                && let Some(free) = row.get_mut(cell.x as usize)
+                && let Some(old) = row.get_mut(cell.x as usize)
+                && (letter != '*' || ['.', '='].contains(old))
             {
-                *free = letter;
+                *old = letter;
             }
+        };
+        for step in positions.windows(2) {
+            let length = step[0].distance(step[1]) / side;
+            let parts = if length <= LONGEST_STEP { (2.0 * length).ceil().max(1.0) } else { 1.0 };
+            (0..=parts as u32).for_each(|part| set(step[0].lerp(step[1], part as f32 / parts), '*'));
         }
+        let end = positions.last().map(|end| (*end, 'X'));
+        [(self.start, 'S'), (self.goal, 'G')].into_iter().chain(end).for_each(|(at, letter)| set(at, letter));
         letters.iter().rev().map(String::from_iter).collect()
+    }
+
+    /// Returns the width and height of a letter of [`rows`](Self::rows).
+    pub fn letter(&self) -> f32 {
+        (self.bounds.size().max_element() / LETTERS).max(1.0)
     }
 
     /// Draws the plan. `label` describes it for readers that do not see it.
@@ -136,6 +169,24 @@ pub fn joined_tiles(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_path_leads_over_free_cells_and_its_end_is_seen_everywhere() {
+        let plan = FloorPlan {
+            bounds: Rect::new(0.0, 0.0, 9.0, 2.0),
+            walls: vec![Rect::new(2.0, 0.0, 3.0, 1.0)],
+            platforms: vec![Rect::new(4.0, 0.0, 5.0, 1.0)],
+            start: Vec2::new(0.5, 0.5),
+            goal: Vec2::new(8.5, 0.5),
+            ..FloorPlan::default()
+        };
+        let at = |x: f32| Vec2::new(x, 0.5);
+        assert_eq!(plan.rows_with_path(&[at(0.5), at(3.5), at(4.5)])[1], "S*#*X...G");
+        assert_eq!(plan.rows_with_path(&[at(0.5), at(6.5)])[1], "S.#.=.X.G", "a jump of six cells is no path");
+        assert_eq!(plan.rows_with_path(&[at(7.5), at(8.5)])[1], "S.#.=..*X");
+        let outside = [Vec2::new(-5.0, 9.0), Vec2::new(f32::NAN, 0.0)];
+        assert_eq!(plan.rows_with_path(&outside), plan.rows());
+    }
 
     #[test]
     fn a_long_plan_has_72_letters_in_a_row_and_what_stands_outside_is_left_out() {

@@ -116,6 +116,14 @@ pub fn last_level(game: &dyn Game, mode: &str) -> Option<u64> {
     game.tools().levels.last_level().filter(|_| !is_level_files(mode))
 }
 
+/// Returns the level files that a text with a misspelt prefix means, such as `file:levels/*.json`.
+fn misspelt_files(text: &str) -> Option<&str> {
+    let (prefix, pattern) = text.split_once(':')?;
+    let is_misspelt = ["file", "files"].iter().any(|word| prefix.eq_ignore_ascii_case(word)) && !is_level_files(text);
+    // As addresses of files have it.
+    is_misspelt.then(|| pattern.strip_prefix("//").unwrap_or(pattern))
+}
+
 /// Returns the level files that a text probably means.
 fn files_like(text: &str) -> &str {
     if text.ends_with(".json") { text } else { "levels/*.json" }
@@ -130,6 +138,16 @@ pub enum SplitError {
          as in files:{}", .0, files_like(.0)
     )]
     NotARange(String),
+    /// The prefix of level files is misspelt.
+    #[error(
+        "`{text}` is not a range of levels: levels from files begin with `files:`; did you mean `files:{pattern}`?"
+    )]
+    MisspeltFiles {
+        /// The text.
+        text: String,
+        /// The pattern behind the prefix.
+        pattern: String,
+    },
     /// A number of the range is too large.
     #[error("`{0}` is not a level: numbers go up to 18,446,744,073,709,551,615")]
     TooLarge(String),
@@ -184,9 +202,10 @@ impl FromStr for LevelSplit {
             let count = find_level_files(pattern)?.len() as u64;
             return Ok(Self { mode: text.to_owned(), first: 0, last: count - 1 });
         }
-        let (mode, first, last) = parse().ok_or_else(|| match too_large(text) {
-            Some(number) => SplitError::TooLarge(number.to_owned()),
-            None => SplitError::NotARange(text.to_owned()),
+        let (mode, first, last) = parse().ok_or_else(|| match (too_large(text), misspelt_files(text)) {
+            (Some(number), _) => SplitError::TooLarge(number.to_owned()),
+            (None, Some(pattern)) => SplitError::MisspeltFiles { text: text.to_owned(), pattern: pattern.to_owned() },
+            (None, None) => SplitError::NotARange(text.to_owned()),
         })?;
         if first > last {
             return Err(SplitError::Reversed { text: text.to_owned(), mode, first, last });
@@ -254,6 +273,16 @@ mod tests {
         let words = "files:no/such/*.json".parse::<LevelSplit>().expect_err("no files").to_string();
         assert!(words.contains("files:no/such/*.json matches no file"), "{words}");
         assert!("files:a.json:9..3".parse::<LevelSplit>().is_err());
+        for (text, meant) in [
+            ("file:levels/*.json", "files:levels/*.json"),
+            ("Files:a.json", "files:a.json"),
+            ("file:///tmp/a.json", "files:/tmp/a.json"),
+        ] {
+            let words = text.parse::<LevelSplit>().expect_err("misspelt").to_string();
+            assert!(words.starts_with(&format!("`{text}` is not")), "{words}");
+            assert!(words.ends_with(&format!("did you mean `{meant}`?")), "{words}");
+        }
+        assert_eq!("file:3".parse::<LevelSplit>().expect("a mode may have this name").mode, "file");
     }
 
     #[test]

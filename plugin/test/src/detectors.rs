@@ -53,7 +53,7 @@ use std::collections::BTreeMap;
 
 pub use crate::detectors::{
     clocks::{SlowTick, TIMING, TickTime, forget_timing},
-    error_log::ErrorLogReader,
+    error_log::{ErrorLogReader, LogLine, LogReader},
     goals::{FarGoal, GoalIgnored},
     par::{ParError, Pars},
     positions::ThroughWall,

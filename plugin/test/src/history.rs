@@ -167,7 +167,7 @@ pub enum Course {
 }
 
 impl Course {
-    /// Orders courses: what somebody should look at comes first.
+    /// Orders courses, the worst first.
     fn rank(&self) -> u8 {
         match self {
             Self::Broken { .. } => 0,
@@ -279,7 +279,7 @@ fn course(tested: &[(&Build, &Seen)]) -> Course {
 
 /// Returns that a level is flaky, if it is.
 fn flaky(tested: &[(&Build, &Seen)]) -> Option<Course> {
-    // What plays the same: program, version, and who tested it how.
+    // Tests that play the same: program, version and plan.
     let mut same: BTreeMap<(&str, u32, &str), Vec<(&Build, bool)>> = BTreeMap::new();
     for (build, seen) in tested {
         if let Some(program) = &build.program {

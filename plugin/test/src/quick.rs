@@ -1,10 +1,10 @@
-//! The verdict on a level while somebody draws it: as soon as possible, with the way that solves it.
+//! The verdict on a level while it is drawn: as soon as possible, with the path that solves it.
 //!
 //! [`judge_quickly`] asks the quickest first: the actions that solved the level before, then testers, as a
 //! [test](crate::verdict) does, and an explorer if none of them solves it. What is known so far is handed to the caller
 //! after each of them.
 //!
-//! - `picture`: the picture of the level, with the way or with the places that nobody reached.
+//! - `picture`: the picture of the level, with the path or with the places that were not reached.
 
 mod picture;
 
@@ -12,11 +12,12 @@ use crate::{
     detectors::Detectors,
     explore::{Exploration, ExploreError, ExplorePlan, Until, explore_until},
     findings::{CheckTick, PlayedSetting, Replayed, Watcher, play_actions, play_player},
-    quick::picture::{Reached, picture},
+    quick::picture::picture,
     verdict::{
         Finding, LevelOutcome, LevelVerdict, Places, TestError, TestObserver, TestPlan, Tester, maps::level_name,
         run_tests_keeping,
     },
+    verdict_report::Reached,
 };
 use bevy::math::Vec2;
 use bevy_playbot::{action::ActionValue, episode::EpisodeEnd};
@@ -49,7 +50,7 @@ pub struct QuickPlan {
 pub struct QuickVerdict {
     /// Its outcome; `None` if that is not known yet.
     pub outcome: Option<LevelOutcome>,
-    /// Who solved it in the fewest ticks: [`STORED`], the name of a tester, or [`EXPLORER`].
+    /// The one that solved it in the fewest ticks: [`STORED`], the name of a tester, or [`EXPLORER`].
     pub solved_by: Option<String>,
     /// Ticks of that episode.
     pub ticks: Option<u32>,
@@ -65,9 +66,9 @@ pub struct QuickVerdict {
     pub findings: Vec<Finding>,
     /// Open squares that the explorer has reached, if it was asked and the level has a plan.
     pub reached: Option<Places>,
-    /// The level with the way, as SVG in the colours of reports; `None` without a plan.
+    /// The level with the path, as SVG in the colours of reports; `None` without a plan.
     pub picture: Option<String>,
-    /// Whether nobody else will be asked.
+    /// Whether no other tester will play.
     pub is_final: bool,
 }
 

@@ -66,7 +66,9 @@ pub use crate::verdict::{
     compare::{Change, Comparison, EarlierTest, FALSE_DISCOVERY_RATE, FindingChange, RecordedWins, UnreachedSquares},
     error::TestError,
     folder::{Earlier, TestFolder},
-    maps::{FailurePath, LevelMaps, LevelPars, MapScope, SkillTicks, hash_of_files, level_name},
+    maps::{
+        EpisodePath, LevelMaps, LevelPars, MapScope, PlanRows, SkillTicks, TesterEvents, hash_of_files, level_name,
+    },
     merge::merge,
     plan::{TestPlan, TestRecord, TestedRun, Tester, TesterRecord},
     reports::{
@@ -218,6 +220,9 @@ pub struct TesterVerdict {
     /// Open squares that it visited in all its episodes, for levels with maps.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub places: Option<Places>,
+    /// Events in its episodes, for levels with maps. Older results lack them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub events: Option<TesterEvents>,
 }
 
 /// Ends of episodes.
@@ -352,6 +357,7 @@ fn judge(
         score: score(episodes.iter()),
         exact: episodes.iter().all(|episode| episode.exact),
         places: None,
+        events: None,
     });
     let all = || played.iter().flat_map(|episodes| episodes.iter());
     let score = score(all());
@@ -415,8 +421,10 @@ fn judge(
         if let Some(walked) = walked {
             verdict.places = walked.places;
             verdict.maps = Some(walked.maps);
-            for (tester, places) in verdict.testers.iter_mut().zip(walked.testers) {
-                tester.places = places;
+            for (tester, (places, events)) in
+                verdict.testers.iter_mut().zip(walked.testers.into_iter().zip(walked.events))
+            {
+                (tester.places, tester.events) = (places, Some(events));
             }
         }
     }
@@ -564,6 +572,7 @@ mod tests {
             "not_kept",
             "too_short",
             "recorded",
+            "events",
         ];
         for name in newer {
             assert!(!old.contains(name), "{old}");
@@ -589,7 +598,9 @@ mod tests {
         let setting = Some("stuck.ticks=60".to_owned());
         let too_short = vec![TooShort { detector: "stuck".to_owned(), needs: 301, had: 120, setting }];
         let seconds = Some(0.1 + 0.2);
-        let new = LevelVerdict { seconds, reached: Some(reached), not_kept, too_short, recorded, ..new };
+        let mut new = LevelVerdict { seconds, reached: Some(reached), not_kept, too_short, recorded, ..new };
+        let events = TesterEvents { ends: vec![[3, 1, 0]], lost: vec![[3, 9]], visited: vec![[2, 2]] };
+        new.testers[0].events = Some(events);
         let text = serde_json::to_string(&new).expect("serialises");
         assert_eq!(serde_json::from_str::<LevelVerdict>(&text).expect("whole"), new);
     }

@@ -5,24 +5,33 @@
 //! and without its few lines of script it is a plain table. It follows the reader's light or dark setting.
 //!
 //! The page is a function of the results, of the results compared with, and of the game, which draws the pictures.
-//! The results of a whole range and those joined from shards give the same bytes.
+//! The results of a whole range and those joined from shards give the same bytes. With [`HtmlReport::split`] the pictures
+//! are files beside the page.
 //!
 //! The files of the folder, in reading order:
 //!
 //! - `selection`: the levels of the page, the worst ones first.
 //! - `gallery`: all levels as small pictures.
 //! - `cards`: findings as the game shows them.
+//! - `pairs`: changed levels, before and now.
+//! - `events`: events of all levels of one size, as layers.
 //! - `level_table`: the table of levels.
 //! - `drawn`: the drawings of the levels in the table, and descriptions of walks.
-//! - `picture`, `heat`, `clip`: the plan with the ends of episodes, maps over it, and the path of a failure.
+//! - `picture`, `reach`, `heat`, `clip`: the plan with the ends of episodes, what was reached, maps over it, and the path
+//!   of a failure.
+//! - `files`: pictures in the page, or in files beside it.
 
 mod cards;
 mod clip;
 mod drawn;
+mod events;
+mod files;
 mod gallery;
 mod heat;
 mod level_table;
+mod pairs;
 mod picture;
+mod reach;
 mod selection;
 #[cfg(test)]
 pub(crate) mod testing;
@@ -34,7 +43,16 @@ use crate::{
         AGAINST, Comparison, EpisodeScore, LevelVerdict, Overview, RESULTS, RecordedTotal, TestError, TestRecord,
         TesterRecord, Trials, comparable_command, wilson,
     },
-    verdict_report::{cards::cards, drawn::Plans, gallery::gallery, level_table::level_table, selection::Selection},
+    verdict_report::{
+        cards::cards,
+        drawn::{Drawings, Plans},
+        events::Events,
+        files::PictureFiles,
+        gallery::gallery,
+        level_table::level_table,
+        pairs::pairs,
+        selection::Selection,
+    },
 };
 use playbot_harness::game::Game;
 use playbot_report::{PAGE_STYLE, counted, escape::escape, whole};
@@ -45,8 +63,15 @@ use std::{
     path::Path,
 };
 
-pub use crate::verdict_report::cards::{FindingScene, SceneTick, Scenes};
-pub(crate) use crate::verdict_report::heat::{Block, Grid, path, shape, stacked};
+pub use crate::verdict_report::{
+    cards::{FindingScene, GameLogLine, SceneTick, Scenes},
+    files::folder_of,
+    reach::LevelExplorer,
+};
+pub(crate) use crate::verdict_report::{
+    heat::{Block, Grid, path, shape, stacked},
+    reach::{HATCH, Reached},
+};
 
 /// Name of the file in the folder of a test.
 pub const REPORT: &str = "report.html";
@@ -69,36 +94,54 @@ const MOST_CAUSES: usize = 8;
 /// Largest number of changes of a kind that are listed.
 const MOST_CHANGES: usize = 100;
 
-/// Makes the report of the results in a folder, and writes it to a file.
+/// Makes the report of the results in a folder, and writes it to a file. Pictures beside the page are written before it, and
+/// those of an earlier page that this one does not have are removed after it.
 ///
 /// # Errors
 ///
-/// The folder has no results, they are damaged, or the file cannot be written.
+/// The folder has no results, they are damaged, or a file cannot be written.
 pub fn write_html(results: &Path, file: &Path, report: &HtmlReport) -> Result<(), TestError> {
-    let html = html(results, report)?;
+    let files = if report.split { PictureFiles::beside(file) } else { PictureFiles::default() };
+    let (html, files) = html_with(results, report, files)?;
+    files.write(file)?;
     let written = playbot_learner::write_atomically(file, html.as_bytes());
-    written.map_err(|source| TestError::Io { action: "write", path: file.to_owned(), source })
+    written.map_err(|source| TestError::Io { action: "write", path: file.to_owned(), source })?;
+    files.remove_others(file)
 }
 
-/// Makes the report of the results in a folder.
+/// Makes the report of the results in a folder, with its pictures.
 ///
 /// # Errors
 ///
 /// The folder has no results, or they are damaged.
 pub fn html(results: &Path, report: &HtmlReport) -> Result<String, TestError> {
+    html_with(results, report, PictureFiles::default()).map(|(html, _)| html)
+}
+
+/// Makes the page, and returns it with the pictures that it does not contain.
+fn html_with(results: &Path, report: &HtmlReport, files: PictureFiles) -> Result<(String, PictureFiles), TestError> {
     let overview = Overview::read(results)?;
-    let selection = Selection::read(results)?;
+    let mut events = Events::new(&overview.record);
+    let selection = Selection::read(results, &mut |level| events.add(level))?;
     let plans = Plans::of(report.game, &overview.record);
+    let ticks = overview.time.map_or(0.0, |time| time.as_secs_f64() * plans.tick_hz().unwrap_or(0.0));
+    let drawings = Drawings::new(plans, files, report.explorer, ticks as u64);
+    let pairs = match (report.comparison, report.before) {
+        (Some(comparison), Some(before)) => pairs(before, results, comparison, &drawings)?,
+        _ => String::new(),
+    };
     let page = Page {
         overview: &overview,
         comparison: report.comparison,
+        pairs: &pairs,
+        events: &events,
         selection: &selection,
-        plans: &plans,
+        drawings: &drawings,
         program: report.program,
         folder: results,
         scenes: report.scenes,
     };
-    Ok(page.to_html())
+    Ok((page.to_html(), drawings.files))
 }
 
 /// Returns why a report of this test has no pictures of its levels; `None` if the game can still draw them.
@@ -107,39 +150,49 @@ pub fn without_pictures(game: Option<&dyn Game>, record: &TestRecord) -> Option<
 }
 
 /// Content of a report besides the results.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub struct HtmlReport<'a> {
     /// The tested game, which draws its levels; without it, the page has no pictures.
     pub game: Option<&'a dyn Game>,
     /// Changes since earlier results.
     pub comparison: Option<&'a Comparison>,
+    /// Folder of these earlier results; without it, the page has no pictures of changed levels.
+    pub before: Option<&'a Path>,
     /// Name of the program in the commands that the report shows.
     pub program: &'a str,
     /// Draws findings as the game shows them; without it, they have the plans of their levels.
     pub scenes: Option<Scenes<'a>>,
+    /// Explores the levels that are proved unsolvable; without it, pictures show where testers came.
+    pub explorer: Option<LevelExplorer<'a>>,
+    /// Whether [`write_html`] writes pictures into [a folder](folder_of) beside the page.
+    pub split: bool,
 }
 
 /// Content of the page.
-pub struct Page<'a> {
+struct Page<'a> {
     /// Numbers of all levels.
-    pub overview: &'a Overview,
+    overview: &'a Overview,
     /// Changes, if there are earlier results.
-    pub comparison: Option<&'a Comparison>,
+    comparison: Option<&'a Comparison>,
+    /// The section about changed levels.
+    pairs: &'a str,
+    /// Events of all levels.
+    events: &'a Events,
     /// The levels of the table.
-    pub selection: &'a Selection,
-    /// Their floor plans.
-    pub plans: &'a Plans<'a>,
+    selection: &'a Selection,
+    /// Their drawings.
+    drawings: &'a Drawings<'a>,
     /// Name of the program in commands.
-    pub program: &'a str,
+    program: &'a str,
     /// Folder of the results.
-    pub folder: &'a Path,
+    folder: &'a Path,
     /// Draws findings as the game shows them.
-    pub scenes: Option<Scenes<'a>>,
+    scenes: Option<Scenes<'a>>,
 }
 
 impl Page<'_> {
     /// Returns the HTML file.
-    pub fn to_html(&self) -> String {
+    fn to_html(&self) -> String {
         let record = &self.overview.record;
         let title = text(&format!("{} {}", record.game, record.range));
         let shard = record.shard.map_or_else(String::new, |shard| format!(", shard {shard}"));
@@ -149,19 +202,29 @@ impl Page<'_> {
             counted(u64::from(record.episodes), "episode"),
             record.seed
         );
-        let body = gallery(&in_short(self.overview), self.selection, self.plans)
-            + &cards(self.selection, self.plans, self.program, self.folder, self.scenes)
+        let plans = &self.drawings.plans;
+        let body = gallery(&in_short(self.overview), self.selection, plans)
+            + &cards(self.selection, self.drawings, self.program, self.folder, self.scenes)
             + &numbers(self.overview)
             + &self.comparison.map_or_else(String::new, |changes| compared(changes, record, self.program))
+            + self.pairs
             + &recorded(&self.overview.recorded)
-            + &level_table(record, self.selection, self.plans, self.program);
+            + &self.events.section(plans)
+            + &level_table(record, self.selection, self.drawings, self.program);
+        let patterns = match body.contains("url(#hatch)") || body.contains("class=\"unreached\"") {
+            true => format!("<svg class=\"patterns\" aria-hidden=\"true\">{HATCH}</svg>\n"),
+            false => String::new(),
+        };
+        // Where a page is a file, no word but its scheme names its folder.
+        let pictures = if self.drawings.files.is_split() { "data: 'self' file:" } else { "data:" };
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
              <meta name=\"color-scheme\" content=\"light dark\">\n\
              <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; \
-             script-src 'unsafe-inline'; img-src data:\">\n\
-             <title>{title}</title>\n<style>\n{PAGE_STYLE}{STYLE}</style>\n</head>\n<body>\n<main>\n<header>\n\
+             script-src 'unsafe-inline'; img-src {pictures}\">\n\
+             <title>{title}</title>\n<style>\n{PAGE_STYLE}{STYLE}</style>\n</head>\n<body>\n\
+             {patterns}<main>\n<header>\n\
              <h1>{title}</h1>\n<p class=\"subtitle\">{subtitle}</p>\n</header>\n{body}</main>\n\
              <script>\n{SCRIPT}{GALLERY_SCRIPT}</script>\n</body>\n</html>\n"
         )

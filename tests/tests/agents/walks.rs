@@ -16,8 +16,8 @@ use playbot_test::{
     detectors::Detectors,
     findings::course_of,
     verdict::{
-        Earlier, FailurePath, LevelMaps, LevelVerdict, Overview, Places, RecordedWins, SquareEnds, TestError,
-        TestFolder, TestObserver, TestPlan, Tester, run_tests,
+        Earlier, EpisodePath, LevelMaps, LevelVerdict, Overview, Places, PlanRows, RecordedWins, SquareEnds, TestError,
+        TestFolder, TestObserver, TestPlan, Tester, TesterEvents, run_tests,
     },
 };
 use playbot_tests::{Cell, as_corridor, corridor_plugin};
@@ -269,7 +269,7 @@ fn visits_lost_time_causes_and_places_are_counted() {
     // From square 4: to the left 3, 2, 1 and 0, to the right 5 and 6.
     assert_eq!(level.testers.iter().map(|tester| tester.places).collect::<Vec<_>>(), [places(4), places(1), places(2)]);
     assert_eq!(level.places, places(7));
-    let failure = FailurePath { tester: "left".to_owned(), episode: 0, path: vec![[3, 1], [2, 1], [1, 1], [0, 1]] };
+    let failure = EpisodePath { tester: "left".to_owned(), episode: 0, path: vec![[3, 1], [2, 1], [1, 1], [0, 1]] };
     let expected = LevelMaps {
         side: 1.0,
         columns: 7,
@@ -278,8 +278,19 @@ fn visits_lost_time_causes_and_places_are_counted() {
         // Of 20 ticks the first one is new, and the eight after it are two seconds.
         lost: vec![[4, 11]],
         failure: Some(failure),
+        best: Some(EpisodePath { tester: "right".to_owned(), episode: 0, path: vec![[5, 1], [6, 1]] }),
+        plan: Some(PlanRows { side: 1.0, rows: "7#/3.S2.G".to_owned() }),
         ..LevelMaps::default()
     };
+    let events = |ends: &[[u64; 3]], lost: &[[u64; 2]], visited: &[[u64; 2]]| {
+        Some(TesterEvents { ends: ends.to_vec(), lost: lost.to_vec(), visited: visited.to_vec() })
+    };
+    let of_testers = [
+        events(&[[0, 1, 0]], &[], &[[0, 4]]),
+        events(&[[4, 0, 1]], &[[4, 11]], &[[4, 1]]),
+        events(&[], &[], &[[5, 2]]),
+    ];
+    assert_eq!(level.testers.iter().map(|tester| tester.events.clone()).collect::<Vec<_>>(), of_testers);
     assert_eq!((&level.maps, &level.reached), (&Some(expected), &None), "a map has more than cells");
     let abyss = BTreeMap::from([("abyss".to_owned(), 1)]);
     assert_eq!(level.causes, abyss);

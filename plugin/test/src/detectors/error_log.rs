@@ -112,36 +112,77 @@ const BEVY: [&str; 41] = [
     "world_serialization",
 ];
 
-/// Collects the errors of a thread, for any log filter. All events go on to the previous subscriber.
-pub struct ErrorLogReader {
-    listener: Dispatch,
-    heard: Arc<Mutex<Vec<String>>>,
+/// A line of a game's log.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LogLine {
+    /// Its level.
+    pub level: Level,
+    /// Its message, with the other fields behind it as `name=value`.
+    pub message: String,
 }
+
+/// Collects the log of a thread down to a level, for any log filter. All events go on to the previous subscriber.
+pub struct LogReader {
+    listener: Dispatch,
+    heard: Arc<Mutex<Vec<Heard>>>,
+}
+
+/// Collects the errors of a thread, for any log filter. All events go on to the previous subscriber.
+pub struct ErrorLogReader(LogReader);
 
 struct Listener {
     outer: Dispatch,
+    level: Level,
     most: LevelFilter,
-    heard: Arc<Mutex<Vec<String>>>,
+    heard: Arc<Mutex<Vec<Heard>>>,
+}
+
+/// A message with its level, and its other fields.
+struct Heard {
+    level: Level,
+    message: Message,
+}
+
+impl LogReader {
+    /// Creates a reader for this thread of lines that are at least as severe as `level`.
+    pub fn down_to(level: Level) -> Self {
+        let heard = Arc::<Mutex<Vec<Heard>>>::default();
+        let outer = dispatcher::get_default(Clone::clone);
+        let most = LevelFilter::current().max(LevelFilter::from_level(level));
+        let listener = Dispatch::new(Listener { outer, level, most, heard: Arc::clone(&heard) });
+        Self { listener, heard }
+    }
+
+    /// Runs some work and collects its lines.
+    pub fn listen<T>(&self, work: impl FnOnce() -> T) -> T {
+        dispatcher::with_default(&self.listener, work)
+    }
+
+    /// Returns the lines since the last call.
+    pub fn take(&self) -> Vec<LogLine> {
+        let line = |Heard { level, message }: Heard| LogLine { level, message: message.words + &message.fields };
+        self.heard().into_iter().map(line).collect()
+    }
+
+    fn heard(&self) -> Vec<Heard> {
+        std::mem::take(&mut *self.heard.lock().unwrap_or_else(PoisonError::into_inner))
+    }
 }
 
 impl ErrorLogReader {
     /// Creates an ear for this thread.
     pub fn new() -> Self {
-        let heard = Arc::<Mutex<Vec<String>>>::default();
-        let outer = dispatcher::get_default(Clone::clone);
-        let most = LevelFilter::current().max(LevelFilter::ERROR);
-        let listener = Dispatch::new(Listener { outer, most, heard: Arc::clone(&heard) });
-        Self { listener, heard }
+        Self(LogReader::down_to(Level::ERROR))
     }
 
     /// Runs some work and collects its errors.
     pub fn listen<T>(&self, work: impl FnOnce() -> T) -> T {
-        dispatcher::with_default(&self.listener, work)
+        self.0.listen(work)
     }
 
-    /// Returns the errors since the last call.
+    /// Returns the errors since the last call, without fields besides the message.
     pub fn take(&self) -> Vec<String> {
-        std::mem::take(&mut *self.heard.lock().unwrap_or_else(PoisonError::into_inner))
+        self.0.heard().into_iter().map(|heard| heard.message.words).collect()
     }
 }
 
@@ -166,12 +207,18 @@ fn is_of_engine(target: &str) -> bool {
 
 /// The text of an event.
 #[derive(Default)]
-struct Message(String);
+struct Message {
+    words: String,
+    fields: String,
+}
 
 impl Visit for Message {
     fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
-        if field.name() == "message" {
-            self.0 = format!("{value:?}");
+        match field.name() {
+            "message" => self.words = format!("{value:?}"),
+            // Those of the crate `log` say where the line is in the source.
+            name if name.starts_with("log.") => {}
+            name => self.fields += &format!(" {name}={value:?}"),
         }
     }
 }
@@ -183,7 +230,7 @@ impl Subscriber for Listener {
     }
 
     fn enabled(&self, metadata: &Metadata<'_>) -> bool {
-        *metadata.level() == Level::ERROR || self.outer.enabled(metadata)
+        (metadata.is_event() && *metadata.level() <= self.level) || self.outer.enabled(metadata)
     }
 
     fn max_level_hint(&self) -> Option<LevelFilter> {
@@ -192,10 +239,11 @@ impl Subscriber for Listener {
 
     fn event(&self, event: &Event<'_>) {
         let metadata = event.metadata();
-        if *metadata.level() == Level::ERROR && !is_of_engine(metadata.target()) {
+        let level = *metadata.level();
+        if level <= self.level && !is_of_engine(metadata.target()) {
             let mut message = Message::default();
             event.record(&mut message);
-            self.heard.lock().unwrap_or_else(PoisonError::into_inner).push(message.0);
+            self.heard.lock().unwrap_or_else(PoisonError::into_inner).push(Heard { level, message });
         }
         if self.outer.enabled(metadata) {
             self.outer.event(event);
@@ -258,6 +306,24 @@ mod tests {
         assert_eq!((value, ear.take()), (7, vec!["door 3 has no key".to_owned()]));
         tracing::error!(target: "my_game", "after the end");
         assert!(ear.take().is_empty());
+    }
+
+    #[test]
+    fn lines_down_to_a_level_are_heard_with_their_fields() {
+        let reader = LogReader::down_to(Level::INFO);
+        reader.listen(|| {
+            tracing::info!(target: "my_game", "a door opens");
+            tracing::warn!(target: "my_game", door = 3, key = "red", "no key");
+            tracing::debug!(target: "my_game", "not heard");
+            tracing::info!(target: "bevy_render", "of the engine");
+        });
+        let line = |level, message: &str| LogLine { level, message: message.to_owned() };
+        let expected = [line(Level::INFO, "a door opens"), line(Level::WARN, "no key door=3 key=\"red\"")];
+        assert_eq!(reader.take(), expected);
+        assert!(reader.take().is_empty());
+        let errors = ErrorLogReader::new();
+        errors.listen(|| tracing::error!(target: "my_game", door = 3, "no key"));
+        assert_eq!(errors.take(), ["no key"], "findings keep their messages");
     }
 
     #[test]

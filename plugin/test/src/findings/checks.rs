@@ -121,10 +121,10 @@ fn is_not_solved(_: &FindingHead, replayed: &Replayed) -> Option<u32> {
 // Failed episodes as findings.
 
 /// The game ended the episode before the goal.
-pub(super) const LOST: &str = "lost";
+pub const LOST: &str = "lost";
 
 /// The time limit ended the episode before the goal.
-pub(super) const NOT_SOLVED: &str = "not-solved";
+pub const NOT_SOLVED: &str = "not-solved";
 
 /// Returns the kind of an episode that ended before the goal, and its message; `None` if the goal was reached.
 pub(super) fn failure_of(end: &EpisodeResult) -> Option<(&'static str, String)> {

@@ -140,9 +140,14 @@ pub struct DateError(String);
 impl Date {
     /// Returns today's date, in universal time.
     pub fn today() -> Self {
+        Self::in_days(0)
+    }
+
+    /// Returns the date this many days after today, in universal time.
+    pub fn in_days(days: u16) -> Self {
         // With a clock before 1970 nothing expires.
         let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |passed| passed.as_secs());
-        Self::of_day(seconds / DAY)
+        Self::of_day(seconds / DAY + u64::from(days))
     }
 
     /// Returns the date this many days after 1970-01-01.
@@ -272,6 +277,7 @@ mod tests {
             assert_eq!(Date::of_day(days).to_string(), text);
         }
         assert!(Date::today() > "2024-01-01".parse().expect("a day"));
+        assert!(Date::today() < Date::in_days(1) && Date::in_days(1) < Date::in_days(400));
     }
 
     #[test]

@@ -9,6 +9,7 @@ use crate::findings::{
     play::since_edited,
 };
 use playbot_harness::{game::Game, games::Games, level_files::read::read_text_file, parallel::on_threads};
+use playbot_learner::write_atomically;
 use serde::{Deserialize, Serialize};
 use std::{
     io,
@@ -205,6 +206,9 @@ pub struct PinState {
 /// Largest size of a file of pins, bytes.
 const MOST_PIN_BYTES: u64 = 1 << 20;
 
+/// Most brackets at which a new pin is tried.
+const MOST_PLACES: usize = 1000;
+
 /// The pins of a folder.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Pins(Vec<Pin>);
@@ -217,21 +221,50 @@ impl Pins {
     ///
     /// [`FindingError::Pins`] with line and column, or a file cannot be read.
     pub fn read(folder: &Path) -> Result<Self, FindingError> {
-        let whole = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
-        let above = whole.parent().filter(|_| whole.ends_with(FINDINGS)).map(Path::to_owned);
         let mut pins = Self::default();
-        for place in [folder.to_owned(), folder.join(FINDINGS)].into_iter().chain(above) {
-            pins.0.extend(Self::read_file(place.join(PINS))?.0);
+        for file in pin_files(folder) {
+            pins.0.extend(Self::read_file(file)?.0);
         }
         Ok(pins)
     }
 
-    fn read_file(path: PathBuf) -> Result<Self, FindingError> {
-        let text = match read_text_file(&path, MOST_PIN_BYTES).map_err(io::Error::from) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Self::default()),
-            text => text.map_err(io_error("read", &path))?,
+    /// Pins a finding: adds a pin to the file of a folder of findings, and makes the file if there is none. Other pins and
+    /// comments in it stay as they are. Returns the file.
+    ///
+    /// # Errors
+    ///
+    /// [`FindingError::Pins`] if the file cannot be parsed, or it cannot be read or written. It is unchanged then.
+    pub fn add(folder: &Path, pin: &Pin) -> Result<PathBuf, FindingError> {
+        let path = pin_files(folder).into_iter().find(|file| file.exists()).unwrap_or_else(|| folder.join(PINS));
+        let text = text_of(&path)?;
+        let before = Self::parse(&path, text.as_deref().unwrap_or("[]"))?;
+        let fresh = written(pin).map_err(|error| io_error("write", &path)(io::Error::other(error.to_string())))?;
+        let after = Self([before.0.clone(), vec![pin.clone()]].concat());
+        let added = match &text {
+            Some(text) => with_pin(text, &fresh, &|text| Self::parse(&path, text).is_ok_and(|pins| pins == after)),
+            None => Some(format!("[\n    {fresh},\n]\n")),
         };
-        let pins: Vec<Pin> = ron::from_str(&text).map_err(|error| FindingError::Pins {
+        // No file that parses is without a place for one more.
+        let Some(added) = added else {
+            let message = format!("there is no place for another pin: write {fresh} into it by hand");
+            return Err(FindingError::Pins { path, line: 1, column: 1, message });
+        };
+        write_atomically(&path, added.as_bytes()).map_err(io_error("write", &path))?;
+        Ok(path)
+    }
+
+    /// Returns whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    fn read_file(path: PathBuf) -> Result<Self, FindingError> {
+        text_of(&path)?.map_or_else(|| Ok(Self::default()), |text| Self::parse(&path, &text))
+    }
+
+    fn parse(path: &Path, text: &str) -> Result<Self, FindingError> {
+        let path = path.to_owned();
+        let pins: Vec<Pin> = ron::from_str(text).map_err(|error| FindingError::Pins {
             path: path.clone(),
             line: error.span.start.line,
             column: error.span.start.col,
@@ -255,6 +288,42 @@ impl Pins {
     pub fn unknown(&self, findings: &[&str]) -> Vec<String> {
         self.0.iter().map(name).filter(|name| !findings.contains(name)).map(str::to_owned).collect()
     }
+}
+
+/// Returns the files that may have the pins of a folder of findings.
+fn pin_files(folder: &Path) -> Vec<PathBuf> {
+    let whole = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+    let above = whole.parent().filter(|_| whole.ends_with(FINDINGS)).map(Path::to_owned);
+    let folders = [folder.to_owned(), folder.join(FINDINGS)].into_iter().chain(above);
+    folders.map(|folder| folder.join(PINS)).collect()
+}
+
+/// Reads a file of pins; `None` if there is none.
+fn text_of(path: &Path) -> Result<Option<String>, FindingError> {
+    match read_text_file(path, MOST_PIN_BYTES).map_err(io::Error::from) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        text => text.map(Some).map_err(io_error("read", path)),
+    }
+}
+
+/// Returns a pin as RON, in a line.
+fn written(pin: &Pin) -> Result<String, ron::Error> {
+    let Pin { finding, reason, until } = pin;
+    let [finding, reason] = [finding, reason].map(ron::to_string);
+    Ok(format!("(finding: {}, reason: {}, until: \"{until}\")", finding?, reason?))
+}
+
+/// Adds a pin to the text of a list, so that the result is as wanted. A bracket may stand in a comment or in a reason, and
+/// a comma behind the last pin or not, so the places are tried from the end.
+fn with_pin(text: &str, pin: &str, is_wanted: &dyn Fn(&str) -> bool) -> Option<String> {
+    let places = text.rmatch_indices(']').map(|(place, _)| place);
+    places.take(MOST_PLACES).find_map(|place| {
+        let (before, after) = text.split_at(place);
+        // Not at the end of a line with a comment, which would swallow it.
+        let before = before.trim_end();
+        let added = ["\n    ", ",\n    ", "\n    ,"].map(|between| format!("{before}{between}{pin},\n{after}"));
+        added.into_iter().find(|added| is_wanted(added))
+    })
 }
 
 fn name(pin: &Pin) -> &str {
@@ -313,6 +382,53 @@ mod tests {
         fs::write(below.join(PINS), "a").expect("writable");
         let error = Pins::read(folder.path()).expect_err("no pins").to_string();
         assert!(error.contains("findings/pins.ron, line 1"), "{error}");
+    }
+
+    #[test]
+    fn a_pin_is_added_and_what_was_there_stays() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join(PINS);
+        let pin = |name: &str| Pin {
+            finding: name.to_owned(),
+            reason: "a \"quoted\" [reason],\n§ of two lines // no comment".to_owned(),
+            until: "2027-01-31".parse().expect("a day"),
+        };
+        let one = "(finding: \"a\", reason: \"]\", until: \"2027-01-31\")";
+        for text in [
+            None,
+            Some("[]".to_owned()),
+            Some("[ // none yet\n]\n".to_owned()),
+            Some(format!("[{one}]")),
+            Some(format!("[\n    // Known.\n    {one}, // see [1]\n]\n// [1]: the list\n")),
+            Some(format!("[{one} // no comma\n]")),
+            Some(format!("[{one}, /* ] */ ] /* ] */")),
+        ] {
+            match &text {
+                Some(text) => fs::write(&file, text).expect("writable"),
+                None => drop(fs::remove_file(&file)),
+            }
+            let before = Pins::read(folder.path()).expect("pins").0;
+            for name in ["x", "y.finding"] {
+                assert_eq!(Pins::add(folder.path(), &pin(name)).expect("writable"), file);
+            }
+            let after = Pins::read(folder.path()).expect("pins").0;
+            assert_eq!(after, [before, vec![pin("x"), pin("y.finding")]].concat(), "{text:?}");
+            let now = fs::read_to_string(&file).expect("written");
+            for comment in ["// none yet", "// Known.", "// see [1]", "// [1]: the list", "// no comma"] {
+                let was_there = text.as_ref().is_some_and(|text| text.contains(comment));
+                assert!(!was_there || now.contains(comment), "{comment} is lost: {now}");
+            }
+        }
+        fs::write(&file, "[a]").expect("writable");
+        assert!(Pins::add(folder.path(), &pin("x")).is_err_and(|error| error.is_usage()));
+        assert_eq!(fs::read_to_string(&file).expect("there"), "[a]", "a file that is not understood is left alone");
+        // The pins of the findings are used if the test has none of its own.
+        fs::remove_file(&file).expect("it is there");
+        let below = folder.path().join(FINDINGS);
+        fs::create_dir(&below).expect("writable");
+        fs::write(below.join(PINS), format!("[{one}]")).expect("writable");
+        assert_eq!(Pins::add(folder.path(), &pin("x")).expect("writable"), below.join(PINS));
+        assert!(!file.exists());
     }
 
     #[test]

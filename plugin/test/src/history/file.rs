@@ -69,8 +69,11 @@ fn refused(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Histo
 ///
 /// The file cannot be read, is no history, or is of a later version.
 pub fn read(path: &Path) -> Result<(History, Vec<usize>), HistoryError> {
-    let bytes = std::fs::read(path).map_err(refused("read", path))?;
-    let text = String::from_utf8_lossy(&bytes);
+    of_bytes(path, &std::fs::read(path).map_err(refused("read", path))?)
+}
+
+fn of_bytes(path: &Path, bytes: &[u8]) -> Result<(History, Vec<usize>), HistoryError> {
+    let text = String::from_utf8_lossy(bytes);
     let mut lines = text.lines();
     let head = lines.next().and_then(|line| serde_json::from_str::<serde_json::Value>(line).ok());
     let form = head.as_ref().and_then(|head| head["playbot_history"].as_u64());
@@ -118,14 +121,14 @@ pub fn check_game(path: &Path, history: &History, game: &str) -> Result<(), Hist
 ///
 /// The file cannot be written, or is the history of something else.
 pub fn add(path: &Path, build: &Build) -> Result<(), HistoryError> {
-    let mut text = String::new();
-    if path.exists() {
-        check_game(path, &read(path)?.0, &build.game)?;
-        let ends_a_line = std::fs::read(path).map_err(refused("read", path))?.ends_with(b"\n");
-        text += if ends_a_line { "" } else { "\n" };
-    } else {
-        text += &format!("{}\n", json!({ "playbot_history": FORM }));
-    }
+    let mut text = match std::fs::read(path) {
+        Ok(bytes) => {
+            check_game(path, &of_bytes(path, &bytes)?.0, &build.game)?;
+            if bytes.ends_with(b"\n") { String::new() } else { "\n".to_owned() }
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => format!("{}\n", json!({ "playbot_history": FORM })),
+        Err(error) => return Err(refused("read", path)(error)),
+    };
     let line = json!(build).to_string();
     text += &format!("{} {line}\n", checksum(&line));
     let append = || DiskFile::open(path, OpenOptions::new().create(true).append(true))?.write_all(text.as_bytes());

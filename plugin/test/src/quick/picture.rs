@@ -1,40 +1,18 @@
-//! The picture of a level with a way through it, or with the places that nobody reached.
+//! The picture of a level with a path through it, or with the places that were not reached.
 
-use crate::{
-    explore::{Exploration, open_cells},
-    verdict_report::{Block, Grid, path, shape, stacked},
-};
+use crate::verdict_report::{Block, Grid, HATCH, Reached, path, shape, stacked};
 use bevy::math::{Rect, Vec2};
 use playbot_harness::floor_plan::FloorPlan;
-use std::{collections::BTreeSet, fmt::Write};
+use std::fmt::Write;
 
 /// Most points of a way. Of more, evenly spaced ones are drawn.
 const MOST_POINTS: usize = 400;
 
-/// Lines over places that nobody reached, which no colour of a level has.
-const HATCH: &str = "<defs><pattern id=\"hatch\" width=\"12\" height=\"12\" patternUnits=\"userSpaceOnUse\">\
-                     <path class=\"hatch\" d=\"M-3 3l6-6M0 12L12 0M9 15l6-6\"/></pattern></defs>";
+/// Largest size of what an explorer has reached, bytes: a page of a watch has one picture.
+const MOST_BYTES: usize = 200_000;
 
 /// Share of the plan by which the picture may be larger, for agents that leave it.
 const BEYOND: f32 = 0.5;
-
-/// The squares that an explorer has reached, and those around the start and around the goal that it has not.
-pub(super) struct Reached {
-    reached: Vec<Rect>,
-    missed: Vec<Rect>,
-}
-
-impl Reached {
-    /// Returns them for cells that are squares.
-    pub fn of(explored: &Exploration, floor: &FloorPlan) -> Option<Self> {
-        let grid = explored.grid.as_ref()?;
-        let from_goal = open_cells(&FloorPlan { start: floor.goal, ..floor.clone() }, grid).unwrap_or_default();
-        let beyond = from_goal.iter().filter(|cell| !explored.cells().contains_key(cell));
-        let missed: BTreeSet<_> = explored.missed().chain(beyond).collect();
-        let reached = explored.cells().keys().filter_map(|cell| grid.area(cell)).collect();
-        Some(Self { reached, missed: missed.into_iter().filter_map(|cell| grid.area(cell)).collect() })
-    }
-}
 
 /// Returns the picture: the way that solves the level, the way of a solution that no longer does, and what an explorer has
 /// reached. `None` for a plan without extent.
@@ -49,14 +27,7 @@ pub(super) fn picture(floor: &FloorPlan, way: &[Vec2], lost: &[Vec2], reached: O
         let finite = areas.iter().filter(|area| area.min.is_finite() && area.max.is_finite());
         stacked(finite.filter_map(|area| grid.block(*area)).collect::<Vec<Block>>())
     };
-    if let Some(Reached { reached, missed }) = reached {
-        shape("reached", None, &path(&blocks(reached)), &mut svg);
-        let missed = path(&blocks(missed));
-        shape("missed", None, &missed, &mut svg);
-        if !missed.is_empty() {
-            let _ = write!(svg, "<path class=\"hatched\" fill=\"url(#hatch)\" d=\"{missed}\"/>");
-        }
-    }
+    svg += &reached.map_or_else(String::new, |reached| reached.svg(&grid, MOST_BYTES));
     for (class, areas) in [("wall", &floor.walls), ("platform", &floor.platforms), ("hazard", &floor.hazards)] {
         shape(class, None, &path(&blocks(areas)), &mut svg);
     }
@@ -101,6 +72,7 @@ fn line(grid: &Grid, class: &str, start: Vec2, positions: &[Vec2], svg: &mut Str
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::verdict::LevelMaps;
 
     fn floor() -> FloorPlan {
         FloorPlan {
@@ -124,11 +96,12 @@ mod tests {
     fn a_way_that_is_lost_ends_with_a_cross_and_unreached_places_are_shown() {
         let svg = picture(&floor(), &[], &[Vec2::new(10.0, 2.0)], None).expect("an extent");
         assert!(svg.contains("class=\"way lost-way\" d=\"M15 145L100 140\"") && svg.contains("M93 133l14 14"), "{svg}");
-        let reached =
-            Reached { reached: vec![Rect::new(1.0, 1.0, 2.0, 2.0)], missed: vec![Rect::new(2.0, 1.0, 64.0, 16.0)] };
+        let maps = LevelMaps { side: 1.0, columns: 64, rows: 16, visits: vec![[65, 4]], ..LevelMaps::default() };
+        let reached = Reached::by_testers(&maps, &floor()).expect("open squares");
         let svg = picture(&floor(), &[], &[], Some(&reached)).expect("an extent");
         assert!(svg.contains("<path class=\"reached\" d=\"M10 140h10v10h-10z\"/>"), "{svg}");
-        assert!(svg.contains("<path class=\"missed\" d=\"M20 0h620v150h-620z\"/>"), "{svg}");
+        assert!(svg.contains("<path class=\"missed\" d=\"M0 0h10v150h-10zM10 0h10v140h-10z"), "{svg}");
+        assert!(svg.contains("<pattern id=\"hatch\""), "{svg}");
         let high = picture(&floor(), &[Vec2::new(9.0, 20.0), Vec2::new(9.0, 1e9)], &[], None).expect("an extent");
         assert!(
             high.contains("viewBox=\"0 0 640 480\"") && high.contains("L90 280"),

@@ -1,9 +1,11 @@
 //! Maps of where agents went in a level, as in results.
 
 use crate::detectors::Pars;
+use bevy::math::{Rect, Vec2};
 use bevy_playbot::{state_hash::StateHash, unknown_name::nearest};
 use playbot_harness::{
     brief::shell_word,
+    floor_plan::FloorPlan,
     game::{Game, level_designs},
     level_files::{LevelDesigns, is_level_files, level_files_mode},
     split::LevelSplit,
@@ -14,6 +16,9 @@ use std::{collections::BTreeSet, fmt};
 
 /// Largest number of names that are reported.
 const MOST_NAMES: usize = 5;
+
+/// Most letters of a plan along a side.
+const MOST_LETTERS: usize = 128;
 
 /// Largest number of levels of a range that all have maps: as many as the page shows.
 const MOST_LEVELS: u64 = 2_000;
@@ -47,7 +52,101 @@ pub struct LevelMaps {
     pub skill_at: Vec<[u64; 2]>,
     /// The path of an episode that failed, or that has a finding.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub failure: Option<FailurePath>,
+    pub failure: Option<EpisodePath>,
+    /// The path of the episode that solved the level in the fewest ticks. Older results lack it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub best: Option<EpisodePath>,
+    /// The floor plan as it was in the test. Older results lack it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plan: Option<PlanRows>,
+}
+
+/// Floor plan of a level as text, such that results show a level that has changed since.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlanRows {
+    /// Width and height of a letter.
+    pub side: f32,
+    /// The rows of [`FloorPlan::rows`] from the top with `/` between them, each letter once with the number of times
+    /// that it follows itself: `12.3#S/16#`.
+    pub rows: String,
+}
+
+impl PlanRows {
+    /// Writes a plan as text.
+    pub fn of(plan: &FloorPlan) -> Self {
+        let mut text = String::new();
+        for row in plan.rows() {
+            if !text.is_empty() {
+                text.push('/');
+            }
+            let mut letters = row.chars().peekable();
+            while let Some(letter) = letters.next() {
+                let mut count = 1;
+                while letters.next_if_eq(&letter).is_some() {
+                    count += 1;
+                }
+                if count > 1 {
+                    text += &format!("{count}");
+                }
+                text.push(letter);
+            }
+        }
+        Self { side: plan.letter(), rows: text }
+    }
+
+    /// Returns the plan, given its lower left corner. Its parts are as coarse as the letters. `None` if the text is no
+    /// plan.
+    pub fn plan(&self, corner: Vec2) -> Option<FloorPlan> {
+        let rows: Vec<&str> = self.rows.split('/').collect();
+        if !(corner.is_finite() && self.side.is_finite() && self.side > 0.0) || rows.len() > MOST_LETTERS {
+            return None;
+        }
+        let mut plan = FloorPlan::default();
+        let mut most = 0;
+        for (row, text) in rows.iter().rev().enumerate() {
+            let (mut column, mut count) = (0, String::new());
+            for letter in text.chars() {
+                if letter.is_ascii_digit() {
+                    count.push(letter);
+                    continue;
+                }
+                let next = column + std::mem::take(&mut count).parse().unwrap_or(1).min(MOST_LETTERS);
+                if next > MOST_LETTERS {
+                    return None;
+                }
+                let at = |column: usize, row: usize| corner + Vec2::new(column as f32, row as f32) * self.side;
+                let area = Rect::from_corners(at(column, row), at(next, row + 1));
+                match letter {
+                    '#' => plan.walls.push(area),
+                    '=' => plan.platforms.push(area),
+                    '^' => plan.hazards.push(area),
+                    'S' => plan.start = area.center(),
+                    'G' => plan.goal = area.center(),
+                    _ => {}
+                }
+                column = next;
+            }
+            most = most.max(column);
+        }
+        let size = Vec2::new(most as f32, rows.len() as f32) * self.side;
+        plan.bounds = Rect::from_corners(corner, corner + size);
+        (most > 0 && size.is_finite()).then_some(plan)
+    }
+}
+
+/// Events in the episodes of one tester on a level, in the squares of its [`LevelMaps`].
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TesterEvents {
+    /// Ends without the goal: square, episodes that were lost there, and episodes whose time was up there. Ends outside
+    /// the level are in the nearest square.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub ends: Vec<[u64; 3]>,
+    /// Lost ticks, as in [`LevelMaps::lost`].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lost: Vec<[u64; 2]>,
+    /// Visited squares as runs: the first square, and the number of squares with consecutive numbers.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub visited: Vec<[u64; 2]>,
 }
 
 /// Ticks of a skill.
@@ -62,7 +161,7 @@ pub struct SkillTicks {
 
 /// The path of one episode.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct FailurePath {
+pub struct EpisodePath {
     /// The tester.
     pub tester: String,
     /// Episode of that tester on the level, from 0.
@@ -217,11 +316,46 @@ mod tests {
         let text = serde_json::to_string(&maps).expect("serialises");
         let expected = r#"{"x":-0.5,"y":0.1,"side":1.0,"columns":64,"rows":13,"visits":[[3,70],[4,1]],"lost":[[3,9]]}"#;
         assert_eq!(text, expected);
-        let failure = Some(FailurePath { tester: "random".to_owned(), episode: 1, path: vec![[3, 70], [4, 1]] });
+        let failure = Some(EpisodePath { tester: "random".to_owned(), episode: 1, path: vec![[3, 70], [4, 1]] });
         let skills = vec![SkillTicks { skill: "z1+".to_owned(), ticks: 71 }];
-        let full = LevelMaps { skills, skill_at: vec![[3, 0], [4, 0]], failure, ..maps };
+        let best = Some(EpisodePath { tester: "search".to_owned(), episode: 0, path: vec![[3, 9]] });
+        let plan = Some(PlanRows { side: 1.0, rows: "3.G".to_owned() });
+        let full = LevelMaps { skills, skill_at: vec![[3, 0], [4, 0]], failure, best, plan, ..maps };
         let text = serde_json::to_string(&full).expect("serialises");
         assert_eq!(serde_json::from_str::<LevelMaps>(&text).expect("whole"), full);
+    }
+
+    #[test]
+    fn a_plan_is_read_back_from_its_rows() {
+        let plan = FloorPlan {
+            bounds: Rect::new(-1.0, 2.0, 15.0, 4.0),
+            walls: vec![Rect::new(-1.0, 2.0, 15.0, 3.0), Rect::new(11.0, 3.0, 14.0, 4.0)],
+            start: Vec2::new(14.5, 3.5),
+            goal: Vec2::new(-0.5, 3.5),
+            ..FloorPlan::default()
+        };
+        let rows = PlanRows::of(&plan);
+        assert_eq!((rows.rows.as_str(), rows.side), ("G11.3#S/16#", 1.0));
+        assert_eq!(rows.plan(Vec2::new(-1.0, 2.0)), Some(plan.clone()));
+        let wide = PlanRows { side: 2.5, rows: "^=/2.".to_owned() }.plan(Vec2::ZERO).expect("a plan");
+        let kinds = (wide.hazards, wide.platforms, wide.bounds);
+        let [left, right] = [Rect::new(0.0, 2.5, 2.5, 5.0), Rect::new(2.5, 2.5, 5.0, 5.0)];
+        assert_eq!(kinds, (vec![left], vec![right], Rect::new(0.0, 0.0, 5.0, 5.0)));
+    }
+
+    #[test]
+    fn text_that_is_no_plan_is_refused() {
+        for (side, rows, corner) in [
+            (0.0, "#", Vec2::ZERO),
+            (f32::NAN, "#", Vec2::ZERO),
+            (f32::MAX, "9#", Vec2::ZERO),
+            (1.0, "", Vec2::ZERO),
+            (1.0, "99999999999999999999#100#100#", Vec2::ZERO),
+            (1.0, &"#/".repeat(200), Vec2::ZERO),
+            (1.0, "#", Vec2::NAN),
+        ] {
+            assert_eq!(PlanRows { side, rows: rows.to_owned() }.plan(corner), None, "{side} {rows} {corner}");
+        }
     }
 
     fn found(text: &str) -> LevelPars {

@@ -65,5 +65,5 @@ pub(super) fn verdict(index: u64, solved: u64, episodes: u64) -> LevelVerdict {
 
 /// Makes the verdict of a tester.
 pub(super) fn tester(name: &str, solved: u64, episodes: u64, exact: bool) -> TesterVerdict {
-    TesterVerdict { tester: name.to_owned(), score: score(solved, episodes), exact, places: None }
+    TesterVerdict { tester: name.to_owned(), score: score(solved, episodes), exact, places: None, events: None }
 }

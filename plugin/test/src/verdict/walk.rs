@@ -236,6 +236,15 @@ impl LevelSquares {
         is_inside.then(|| at.y as usize * self.columns + at.x as usize)
     }
 
+    /// Returns the square around a position, or the nearest one for a position outside the level; `None` for one that is
+    /// not finite.
+    pub fn nearest(&self, position: Vec2) -> Option<usize> {
+        let at = ((position - self.grid.origin) / self.grid.size).floor();
+        let last = Vec2::new(self.columns as f32, self.rows as f32) - 1.0;
+        let at = at.max(Vec2::ZERO).min(last);
+        position.is_finite().then(|| at.y as usize * self.columns + at.x as usize)
+    }
+
     /// Returns the squares between two positions of an agent in consecutive ticks; no squares if it has been put
     /// there.
     pub fn between(self, from: Vec2, to: Vec2) -> impl Iterator<Item = usize> {
@@ -383,6 +392,9 @@ mod tests {
         for outside in [Vec2::new(-1.1, 2.5), Vec2::new(3.1, 2.5), Vec2::new(0.0, 5.0), Vec2::NAN] {
             assert_eq!(squares.at(outside), None, "{outside}");
         }
+        let nearest = [Vec2::new(-9.0, -9.0), Vec2::new(1e30, 3.5), Vec2::new(2.5, 4.5)];
+        assert_eq!(nearest.map(|at| squares.nearest(at)), [Some(0), Some(7), Some(11)]);
+        assert_eq!(squares.nearest(Vec2::NAN), None);
         let passed = |to| squares.between(Vec2::new(-0.5, 2.5), to).collect::<Vec<_>>();
         assert_eq!(passed(Vec2::new(2.5, 2.5)), [1, 2]);
         assert!(passed(Vec2::new(3.75, 4.5)).is_empty(), "farther than four tiles");

@@ -2,10 +2,11 @@
 
 use crate::verdict::{
     Finding, Places,
-    maps::{FailurePath, LevelMaps, SkillTicks},
+    maps::{EpisodePath, LevelMaps, PlanRows, SkillTicks, TesterEvents},
     played::{Played, PlayedEnd},
     walk::{LevelSquares, Walk, skill_name},
 };
+use bevy_playbot::episode::EpisodeEnd;
 use playbot_harness::floor_plan::FloorPlan;
 use std::{
     cmp::Reverse,
@@ -16,6 +17,8 @@ use std::{
 pub(super) struct LevelVisits {
     /// Open squares that each tester visited, if known.
     pub testers: Vec<Option<Places>>,
+    /// Events in the episodes of each tester.
+    pub events: Vec<TesterEvents>,
     /// Open squares that any tester visited.
     pub places: Option<Places>,
     /// Maps of where they were.
@@ -45,13 +48,16 @@ impl LevelVisits {
                 .map(|open| Places { visited: open.intersection(visited).count() as u64, open: open.len() as u64 })
         };
         let mut sums: BTreeMap<usize, Sum> = BTreeMap::new();
-        let mut testers = Vec::new();
+        let (mut testers, mut events) = (Vec::new(), Vec::new());
         for episodes in played {
-            let mut visited = BTreeSet::new();
+            let (mut visited, mut lost) = (BTreeSet::new(), BTreeMap::<usize, u64>::new());
             let walks = episodes.iter().filter_map(|episode| episode.walk.as_ref());
             for walk in walks.filter(|walk| walk.squares == squares) {
                 for count in &walk.counts {
                     visited.insert(count.square);
+                    if count.lost > 0 {
+                        *lost.entry(count.square).or_default() += u64::from(count.lost);
+                    }
                     let sum = sums.entry(count.square).or_default();
                     sum.ticks += u64::from(count.ticks);
                     sum.lost += u64::from(count.lost);
@@ -61,12 +67,59 @@ impl LevelVisits {
                 }
             }
             testers.push(places(&visited));
+            events.push(TesterEvents {
+                ends: ends(&squares, episodes),
+                lost: lost.into_iter().map(|(square, ticks)| [square as u64, ticks]).collect(),
+                visited: runs(&visited),
+            });
         }
         let all = places(&sums.keys().copied().collect());
         let mut maps = maps(&squares, &sums);
         maps.failure = failure(names, played, findings);
-        Some(Self { testers, places: all, maps })
+        maps.best = best(names, played);
+        maps.plan = Some(PlanRows::of(plan));
+        Some(Self { testers, events, places: all, maps })
     }
+}
+
+/// Returns the squares in which episodes ended without the goal, with those that were lost and those whose time was up.
+fn ends(squares: &LevelSquares, episodes: &[Played]) -> Vec<[u64; 3]> {
+    let mut counts: BTreeMap<usize, [u64; 2]> = BTreeMap::new();
+    for episode in episodes {
+        let PlayedEnd::Ended { result, position: Some(position), .. } = &episode.end else { continue };
+        if let Some(square) = squares.nearest(*position).filter(|_| !result.success) {
+            counts.entry(square).or_default()[usize::from(result.end == EpisodeEnd::Truncated)] += 1;
+        }
+    }
+    counts.into_iter().map(|(square, [lost, timed_out])| [square as u64, lost, timed_out]).collect()
+}
+
+/// Returns squares as runs of consecutive ones.
+fn runs(squares: &BTreeSet<usize>) -> Vec<[u64; 2]> {
+    let mut runs: Vec<[u64; 2]> = Vec::new();
+    for square in squares.iter().map(|square| *square as u64) {
+        match runs.last_mut() {
+            Some([first, count]) if *first + *count == square => *count += 1,
+            _ => runs.push([square, 1]),
+        }
+    }
+    runs
+}
+
+/// Returns the path of the episode that reached the goal in the fewest ticks, the first of several.
+fn best(names: &[&str], played: &[&[Played]]) -> Option<EpisodePath> {
+    let mut best: Option<(u32, EpisodePath)> = None;
+    for (tester, episodes) in names.iter().zip(played) {
+        for (number, episode) in (0..).zip(episodes.iter()) {
+            let PlayedEnd::Ended { result, .. } = &episode.end else { continue };
+            let is_better = result.success && best.as_ref().is_none_or(|(least, _)| result.ticks < *least);
+            if let Some(walk) = episode.walk.as_ref().filter(|_| is_better) {
+                let path = EpisodePath { tester: (*tester).to_owned(), episode: number, path: walk.trail.clone() };
+                best = Some((result.ticks, path));
+            }
+        }
+    }
+    best.map(|(_, path)| path)
 }
 
 fn maps(squares: &LevelSquares, sums: &BTreeMap<usize, Sum>) -> LevelMaps {
@@ -92,15 +145,17 @@ fn maps(squares: &LevelSquares, sums: &BTreeMap<usize, Sum>) -> LevelMaps {
         skill_at: skill_at.collect(),
         skills: order.iter().map(|(skill, ticks)| SkillTicks { skill: skill_name(*skill), ticks: *ticks }).collect(),
         failure: None,
+        best: None,
+        plan: None,
     }
 }
 
 /// Returns the path to the first finding from play, or else the path of the first episode that failed.
-fn failure(names: &[&str], played: &[&[Played]], findings: &[Finding]) -> Option<FailurePath> {
+fn failure(names: &[&str], played: &[&[Played]], findings: &[Finding]) -> Option<EpisodePath> {
     let path = |tester: usize, episode: usize| {
         let Walk { trail, .. } = played.get(tester)?.get(episode)?.walk.as_ref()?;
         let tester = (*names.get(tester)?).to_owned();
-        Some(FailurePath { tester, episode: u32::try_from(episode).ok()?, path: trail.clone() })
+        Some(EpisodePath { tester, episode: u32::try_from(episode).ok()?, path: trail.clone() })
     };
     let found = findings.iter().find_map(|finding| {
         let tester = names.iter().position(|name| Some(*name) == finding.tester.as_deref())?;
@@ -124,7 +179,7 @@ fn has_failed(episode: &Played) -> bool {
 #[cfg(test)]
 mod tests {
     use bevy::math::{Rect, Vec2};
-    use bevy_playbot::episode::{EpisodeEnd, EpisodeResult};
+    use bevy_playbot::episode::EpisodeResult;
 
     use super::*;
     use crate::verdict::{track::Track, walk::SquareCount};
@@ -174,6 +229,37 @@ mod tests {
         let failure = maps.failure.expect("one has failed");
         assert_eq!((failure.tester.as_str(), failure.episode), ("b", 0));
         assert_eq!(failure.path, [[1, 1], [2, 1], [4, 1]]);
+        let best = maps.best.expect("one has solved it");
+        assert_eq!((best.tester.as_str(), best.path), ("a", vec![[0, 2], [1, 5]]));
+        assert_eq!(maps.plan.map(|plan| plan.rows).as_deref(), Some("G3.#"), "the goal is at 0, as is the start");
+        let events = |ends, lost, visited| TesterEvents { ends, lost, visited };
+        let none = Vec::new;
+        assert_eq!(walked.events[0], events(none(), vec![[1, 1]], vec![[0, 2]]));
+        assert_eq!(walked.events[1], events(none(), vec![[2, 1]], vec![[1, 2], [4, 1]]));
+    }
+
+    #[test]
+    fn events_are_those_of_each_tester_and_the_best_path_is_the_shortest() {
+        let ended = |end: EpisodeEnd, success: bool, ticks: u32, at: f32, square: usize| {
+            let result = EpisodeResult { level: 0, end, success, ticks, clipped: 0, total_reward: 0.0 };
+            let end = PlayedEnd::Ended { result, position: Some(Vec2::new(at, 0.5)), cause: None };
+            Played { end, ..episode(success, &[(square, 1, 0, &[])]) }
+        };
+        let dead = EpisodeEnd::Terminated { success: false };
+        let one = [
+            ended(dead, false, 3, 2.5, 2),
+            ended(EpisodeEnd::Truncated, false, 9, 2.5, 2),
+            ended(dead, false, 3, 1e9, 2),
+            ended(EpisodeEnd::WON, true, 7, 3.5, 3),
+        ];
+        let other = [ended(EpisodeEnd::WON, true, 5, 3.5, 1), ended(EpisodeEnd::WON, true, 5, 3.5, 0)];
+        let walked = LevelVisits::of(&plan(), &["a", "b"], &[&one, &other], &[]).expect("walks are known");
+        assert_eq!(walked.events[0].ends, [[2, 1, 1], [4, 1, 0]], "far away is at the border");
+        assert!(walked.events[1].ends.is_empty(), "it has solved the level");
+        let best = walked.maps.best.expect("it was solved");
+        assert_eq!((best.tester.as_str(), best.episode, best.path), ("b", 0, vec![[1, 1]]));
+        let lost = LevelVisits::of(&plan(), &["a"], &[&one[..2]], &[]).expect("walks are known");
+        assert_eq!(lost.maps.best, None);
     }
 
     #[test]

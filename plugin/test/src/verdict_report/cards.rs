@@ -1,10 +1,11 @@
 //! Findings as cards: as the game shows them, the keys before them, what moved, and the command that replays them.
 
 use crate::{
+    detectors::LogLine,
     verdict::{Finding, LevelVerdict},
     verdict_report::{
-        clip::base64,
-        drawn::{Drawer, Plans},
+        drawn::{Drawer, Drawings, Drawn},
+        files::PictureFiles,
         selection::Selection,
         text,
     },
@@ -20,6 +21,9 @@ const MOST_CARDS: usize = 50;
 /// Most letters of all pictures together. Later findings have none.
 const MOST_LETTERS: usize = 12_000_000;
 
+/// Most lines of a game's log on a card, the last ones.
+const MOST_LINES: usize = 20;
+
 /// Width and height of a curve, pixels.
 const CURVE: [f32; 2] = [280.0, 44.0];
 
@@ -32,6 +36,17 @@ pub struct FindingScene {
     pub moving: Vec<u8>,
     /// The ticks.
     pub ticks: Vec<SceneTick>,
+    /// Lines that the game logged in these ticks.
+    pub log: Vec<GameLogLine>,
+}
+
+/// A line of a game's log.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GameLogLine {
+    /// Tick of the episode, from 0, in which it was logged.
+    pub tick: u32,
+    /// The line.
+    pub line: LogLine,
 }
 
 /// A tick of a scene.
@@ -53,7 +68,7 @@ pub type Scenes<'a> = &'a dyn Fn(&Path) -> Option<FindingScene>;
 /// Writes the section of the page; empty without findings. `folder` is that of the results.
 pub(crate) fn cards(
     selection: &Selection,
-    plans: &Plans,
+    drawings: &Drawings,
     program: &str,
     folder: &Path,
     scenes: Option<Scenes>,
@@ -71,21 +86,29 @@ pub(crate) fn cards(
             write!(out, " These are the first {MOST_CARDS}, of the worst levels; {more} are below, with their levels.");
     }
     out += "</p>\n<div class=\"cards\">\n";
-    let mut drawer = Drawer::new(plans);
+    let mut drawer = Drawer::new(drawings);
     let mut letters = 0;
     for (level, finding) in found().take(MOST_CARDS) {
         let file = finding.file.as_ref().map(|file| folder.join(file));
         let scene = file.as_deref().zip(scenes).filter(|_| letters < MOST_LETTERS);
         let scene = scene.and_then(|(file, scenes)| scenes(file));
-        let pictures = scene.as_ref().map_or_else(String::new, scene_html);
+        let pictures = scene.as_ref().map_or_else(String::new, |scene| scene_html(scene, &drawings.files));
         letters += pictures.len();
-        // The maps are those of the table.
-        let bare = || LevelVerdict { maps: None, ..level.clone() };
-        let plan = if finding.tester.is_none() || pictures.is_empty() { drawer.draw(&bare()) } else { None };
-        let plan = plan.map_or_else(String::new, |drawn| format!("<figure>{}</figure>", drawn.picture));
+        let plan =
+            if finding.tester.is_none() || pictures.is_empty() { plan(&mut drawer, level) } else { String::new() };
         out += &card(level, finding, program, &(pictures + &plan));
     }
     out + "</div>\n</section>\n"
+}
+
+/// Draws the plan of a level, with the squares that were reached if it was not solved.
+fn plan(drawer: &mut Drawer, level: &LevelVerdict) -> String {
+    // The maps are those of the table.
+    let drawn = drawer.draw_bare(level);
+    drawn.map_or_else(String::new, |Drawn { picture, reach, .. }| {
+        let reach = reach.map_or_else(String::new, |reach| format!("<figcaption class=\"key\">{reach}.</figcaption>"));
+        format!("<figure>{picture}{reach}</figure>")
+    })
 }
 
 fn card(level: &LevelVerdict, finding: &Finding, program: &str, pictures: &str) -> String {
@@ -106,14 +129,14 @@ fn card(level: &LevelVerdict, finding: &Finding, program: &str, pictures: &str) 
 }
 
 /// Writes the pictures of a scene with the keys below, and its curves.
-fn scene_html(scene: &FindingScene) -> String {
+fn scene_html(scene: &FindingScene, files: &PictureFiles) -> String {
     let (Some(first), Some(last)) = (scene.ticks.first(), scene.ticks.last()) else { return String::new() };
     let ticks = format!("ticks {} to {}", first.tick, last.tick);
     let mut out = format!(
-        "<figure class=\"scene\"><img src=\"data:image/png;base64,{}\" data-moving=\"{}\" alt=\"The game in tick {}\" \
+        "<figure class=\"scene\"><img src=\"{}\" data-moving=\"{}\" alt=\"The game in tick {}\" \
          loading=\"lazy\"><button type=\"button\" class=\"moving\" hidden>Play {ticks}</button></figure>\n",
-        base64(&scene.still),
-        base64(&scene.moving),
+        files.source(&scene.still),
+        files.source(&scene.moving),
         last.tick
     );
     let _ = writeln!(out, "<p class=\"keys\">{}</p>", keys(&scene.ticks));
@@ -130,7 +153,26 @@ fn scene_html(scene: &FindingScene) -> String {
     if rewards.iter().any(|reward| *reward != 0.0) {
         out += &curve("reward", &rewards);
     }
-    out
+    out + &log(&scene.log)
+}
+
+/// Writes the last lines of a game's log with their ticks; empty without lines.
+fn log(lines: &[GameLogLine]) -> String {
+    if lines.is_empty() {
+        return String::new();
+    }
+    let left_out = lines.len().saturating_sub(MOST_LINES);
+    let title = match left_out {
+        0 => counted(lines.len() as u64, "line"),
+        more => format!("the last {MOST_LINES} lines, after {more} more"),
+    };
+    let mut out =
+        format!("<details class=\"log\" open><summary>Log of the game: {title}</summary>\n<ol tabindex=\"0\">\n");
+    for GameLogLine { tick, line } in &lines[left_out..] {
+        let class = line.level.as_str().to_lowercase();
+        let _ = writeln!(out, "<li class=\"{class}\">tick {tick} {} {}</li>", line.level, text(&line.message));
+    }
+    out + "</ol></details>\n"
 }
 
 /// Returns the actions, each once with the number of ticks in a row, the last ones of many.
@@ -176,7 +218,10 @@ fn curve(name: &str, values: &[f32]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::verdict_report::testing::{Garden, finding, level, record};
+    use crate::verdict_report::{
+        drawn::Plans,
+        testing::{Garden, finding, level, record},
+    };
 
     fn scene() -> FindingScene {
         let tick = |number: u16| SceneTick {
@@ -185,38 +230,61 @@ mod tests {
             reward: 0.0,
             position: Some([f32::from(number), 2.0]),
         };
-        FindingScene { still: vec![1, 2, 3], moving: vec![4, 5], ticks: (0..10).map(tick).collect() }
+        FindingScene { still: vec![1, 2, 3], moving: vec![4, 5], ticks: (0..10).map(tick).collect(), log: Vec::new() }
+    }
+
+    #[test]
+    fn the_last_lines_of_the_log_are_shown_with_their_ticks() {
+        let line = |tick: u32, level: tracing::Level, message: &str| GameLogLine {
+            tick,
+            line: LogLine { level, message: message.to_owned() },
+        };
+        assert_eq!(log(&[]), "");
+        let few = log(&[line(41, tracing::Level::WARN, "the <door> jams"), line(49, tracing::Level::ERROR, "no key")]);
+        assert!(few.contains("Log of the game: 2 lines</summary>"), "{few}");
+        assert!(few.contains("<li class=\"warn\">tick 41 WARN the &lt;door&gt; jams</li>"), "{few}");
+        assert!(few.contains("<li class=\"error\">tick 49 ERROR no key</li>"), "{few}");
+        let many: Vec<GameLogLine> = (0..33).map(|tick| line(tick, tracing::Level::INFO, &"x".repeat(900))).collect();
+        let many = log(&many);
+        assert!(many.contains("the last 20 lines, after 13 more") && !many.contains("tick 12 "), "{many}");
+        assert!(many.contains("tick 13 INFO x") && many.len() < 20 * 480, "long lines are cut: {}", many.len());
     }
 
     #[test]
     fn a_finding_is_shown_with_its_pictures_keys_and_curves() {
         let tested = record("hard:0..1", None);
-        let plans = Plans::of(Some(&Garden), &tested);
+        let drawings = Drawings::new(Plans::of(Some(&Garden), &tested), PictureFiles::default(), None, 0);
         let mut bad = level(1, 0, 9, 0);
         bad.findings = vec![crate::verdict::Finding {
             file: Some("findings/a b.finding".to_owned()),
             ..finding("stuck", "it <i>is</i>")
         }];
         let selection = Selection { levels: vec![bad], left_out: 0, gallery: Vec::new(), all: 1 };
-        let scenes = |path: &Path| (path == Path::new("runs/a test/findings/a b.finding")).then(scene);
-        let html = cards(&selection, &plans, "jump", Path::new("runs/a test"), Some(&scenes));
+        let scenes = |path: &Path| {
+            (path == Path::new("runs/a test/findings/a b.finding")).then(|| {
+                let line = LogLine { level: tracing::Level::INFO, message: "the door opens".to_owned() };
+                FindingScene { log: vec![GameLogLine { tick: 48, line }], ..scene() }
+            })
+        };
+        let html = cards(&selection, &drawings, "jump", Path::new("runs/a test"), Some(&scenes));
         for words in [
             "<h3>stuck</h3>",
             "it &lt;i&gt;is&lt;/i&gt;",
-            "src=\"data:image/png;base64,AQID\" data-moving=\"BAU=\"",
+            "src=\"data:image/png;base64,AQID\" data-moving=\"data:image/png;base64,BAU=\"",
             "Play ticks 40 to 49",
             "<kbd>right</kbd>&nbsp;×&nbsp;7 <kbd>jump &lt;b&gt;</kbd>&nbsp;×&nbsp;3",
             "x: 0 to 9.000, at last 9.000",
             "moved in a tick: 1.000 to 1.000",
+            "<li class=\"info\">tick 48 INFO the door opens</li>",
             "jump replay &#39;findings/a b.finding&#39; --window",
         ] {
             assert!(html.contains(words), "{words} in {html}");
         }
         assert!(!html.contains("reward:"), "there was none: {html}");
-        let without = cards(&selection, &plans, "jump", Path::new("runs"), None);
+        let without = cards(&selection, &drawings, "jump", Path::new("runs"), None);
         assert!(without.contains("<svg class=\"level\"") && !without.contains("<img"), "the plan instead: {without}");
         let sound = Selection { levels: vec![level(0, 9, 9, 40)], left_out: 0, gallery: Vec::new(), all: 1 };
-        assert_eq!(cards(&sound, &plans, "jump", Path::new("runs"), None), "");
+        assert_eq!(cards(&sound, &drawings, "jump", Path::new("runs"), None), "");
     }
 
     #[test]

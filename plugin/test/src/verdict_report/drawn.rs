@@ -1,18 +1,27 @@
 //! Drawings of the levels in the table.
 
 use crate::{
-    verdict::{LevelVerdict, SkillTicks, TestRecord, hash_of_files},
+    explore::Exploration,
+    verdict::{LevelOutcome, LevelVerdict, SkillTicks, TestRecord, hash_of_files},
     verdict_report::{
-        clip::{base64, clip},
+        clip::clip,
+        files::PictureFiles,
         heat::SKILL_COLOURS,
         most_frequent,
         picture::picture,
+        reach::{LevelExplorer, Reached},
         text,
     },
 };
 use playbot_harness::{floor_plan::FloorPlan, game::Game, split::LevelSplit};
 use playbot_report::readable;
-use std::{cmp::Reverse, fmt::Write};
+use std::{
+    cell::{Cell, RefCell},
+    cmp::Reverse,
+    collections::BTreeMap,
+    fmt::Write,
+    rc::Rc,
+};
 
 /// Largest number of levels with a picture, the worst ones.
 const MOST_PICTURES: usize = 200;
@@ -23,19 +32,78 @@ const MOST_CLIPS: usize = 60;
 /// Largest number of letters of all clips together.
 const MOST_LETTERS: usize = 1_200_000;
 
+/// Least and largest number of environment steps in which an explorer explores the unsolvable levels of a page. Within
+/// them it takes as many as the test did.
+const EXPLORED: [u64; 2] = [20_000, 400_000];
+
 /// Drawing of a level.
 pub struct Drawn {
     /// Its picture, as SVG.
     pub picture: String,
     /// The ends of its axes, in words.
     pub axes: String,
-    /// Its failure as an animated PNG, in base64.
+    /// The squares that were not reached, in words, of a level that no tester solved.
+    pub reach: Option<String>,
+    /// Address of its failure as an animated PNG.
     pub clip: Option<String>,
 }
 
+/// Drawings of the levels of a page: their plans, the squares that were reached, and the files of pictures.
+pub(crate) struct Drawings<'a> {
+    /// The plans.
+    pub plans: Plans<'a>,
+    /// Pictures in files, or in the page.
+    pub files: PictureFiles,
+    explorer: Option<LevelExplorer<'a>>,
+    /// Steps that the explorer has left.
+    left: Cell<u64>,
+    /// The squares by the index of the level: cards and table show the same levels.
+    reached: RefCell<BTreeMap<u64, Option<Rc<Reached>>>>,
+}
+
+impl<'a> Drawings<'a> {
+    /// Makes the drawings of a page. Without an explorer, squares are those of the testers; `played` is the number of ticks
+    /// that these have played.
+    pub fn new(plans: Plans<'a>, files: PictureFiles, explorer: Option<LevelExplorer<'a>>, played: u64) -> Self {
+        let left = Cell::new(played.clamp(EXPLORED[0], EXPLORED[1]));
+        Self { plans, files, explorer, left, reached: RefCell::default() }
+    }
+
+    /// Returns the squares that were reached in a level with this plan, and those that were not. `None` for a level that
+    /// was solved, or whose squares are unknown.
+    pub fn reached(&self, level: &LevelVerdict, plan: &FloorPlan) -> Option<Rc<Reached>> {
+        if level.outcome == LevelOutcome::Solved {
+            return None;
+        }
+        if let Some(known) = self.reached.borrow().get(&level.index) {
+            return known.clone();
+        }
+        let explored = self.explored(level).and_then(|explored| Reached::of(&explored, plan));
+        let reached = match (explored, &level.maps) {
+            (Some(explored), Some(maps)) => Some(explored.with_testers(maps)),
+            (Some(explored), None) => Some(explored),
+            (None, Some(maps)) => Reached::by_testers(maps, plan),
+            (None, None) => None,
+        };
+        let reached = reached.map(Rc::new);
+        self.reached.borrow_mut().insert(level.index, reached.clone());
+        reached
+    }
+
+    /// Explores a level that is proved unsolvable. In others, which a longer search may solve, the testers are all.
+    fn explored(&self, level: &LevelVerdict) -> Option<Exploration> {
+        let explorer = self.explorer.filter(|_| level.outcome == LevelOutcome::ProvedUnsolvable)?;
+        let Plans::Known { game, range } = &self.plans else { return None };
+        let (number, mut left) = (self.plans.number(level.index)?, self.left.get());
+        let explored = explorer.explore(*game, &range.mode, number, &mut left);
+        self.left.set(left);
+        explored
+    }
+}
+
 /// Drawer of levels, within the size limits of the page.
-pub struct Drawer<'a> {
-    plans: &'a Plans<'a>,
+pub(crate) struct Drawer<'a> {
+    drawings: &'a Drawings<'a>,
     levels: usize,
     clips: usize,
     letters: usize,
@@ -43,29 +111,45 @@ pub struct Drawer<'a> {
     pub pictures: usize,
     /// Number of those with maps.
     pub maps: usize,
+    /// Number of those with reached squares.
+    pub reached: usize,
 }
 
 impl<'a> Drawer<'a> {
     /// Makes a drawer for a page without pictures so far.
-    pub fn new(plans: &'a Plans<'a>) -> Self {
-        Self { plans, levels: 0, clips: 0, letters: 0, pictures: 0, maps: 0 }
+    pub fn new(drawings: &'a Drawings<'a>) -> Self {
+        Self { drawings, levels: 0, clips: 0, letters: 0, pictures: 0, maps: 0, reached: 0 }
     }
 
     /// Draws the next level of the table; `None` if it has no plan, or enough were drawn.
     pub fn draw(&mut self, level: &LevelVerdict) -> Option<Drawn> {
+        self.draw_as(level, level)
+    }
+
+    /// Draws the next level as [`draw`](Self::draw) does, without its maps and its clip.
+    pub fn draw_bare(&mut self, level: &LevelVerdict) -> Option<Drawn> {
+        self.draw_as(level, &LevelVerdict { maps: None, ..level.clone() })
+    }
+
+    /// Draws what is to be shown of a level.
+    fn draw_as(&mut self, level: &LevelVerdict, shown: &LevelVerdict) -> Option<Drawn> {
         self.levels += 1;
-        let plan = if self.levels <= MOST_PICTURES { self.plans.get(level)? } else { return None };
-        let (picture, axes) = picture(&plan, level)?;
+        let Drawings { plans, files, .. } = self.drawings;
+        let plan = if self.levels <= MOST_PICTURES { plans.get(level)? } else { return None };
+        let reached = self.drawings.reached(level, &plan);
+        let (picture, axes) = picture(&plan, shown, reached.as_deref())?;
         self.pictures += 1;
-        self.maps += usize::from(level.maps.is_some());
+        self.maps += usize::from(shown.maps.is_some());
+        self.reached += usize::from(reached.is_some());
         let is_room = self.clips < MOST_CLIPS && self.letters < MOST_LETTERS;
-        let clip = level.maps.as_ref().filter(|_| is_room).and_then(|maps| clip(&plan, maps, self.plans.tick_hz()?));
-        let text = clip.map(|bytes| base64(&bytes));
-        self.letters += text.as_ref().map_or(0, String::len);
+        let clip = shown.maps.as_ref().filter(|_| is_room).and_then(|maps| clip(&plan, maps, plans.tick_hz()?));
+        let letters = clip.as_ref().map_or(0, |bytes| bytes.len().div_ceil(3) * 4);
+        self.letters += letters;
         // The first clip without room is the last one that is tried.
-        let clip = text.filter(|_| self.letters <= MOST_LETTERS);
+        let clip = clip.filter(|_| self.letters <= MOST_LETTERS).map(|bytes| files.source(&bytes));
         self.clips += usize::from(clip.is_some());
-        Some(Drawn { picture, axes, clip })
+        let reach = reached.map(|reached| reached.words());
+        Some(Drawn { picture, axes, reach, clip })
     }
 }
 
@@ -103,8 +187,13 @@ impl<'a> Plans<'a> {
     /// Returns the plan of the level with this index in the range of the test.
     pub fn at(&self, index: u64) -> Option<FloorPlan> {
         let Self::Known { game, range } = self else { return None };
-        let number = range.first.checked_add(index).filter(|number| *number <= range.last)?;
-        game.tools().levels.floor_plan(&range.mode, number)
+        game.tools().levels.floor_plan(&range.mode, self.number(index)?)
+    }
+
+    /// Returns the number of the level with this index in the range of the test.
+    fn number(&self, index: u64) -> Option<u64> {
+        let Self::Known { range, .. } = self else { return None };
+        range.first.checked_add(index).filter(|number| *number <= range.last)
     }
 
     /// Returns the game's ticks per second; `None` without plans.
@@ -205,16 +294,16 @@ fn swatch(rank: usize) -> String {
 mod tests {
     use super::*;
     use crate::{
-        verdict::{FailurePath, LevelMaps, Places, SquareEnds},
+        verdict::{EpisodePath, LevelMaps, Places, SquareEnds},
         verdict_report::testing::{Garden, level, record},
     };
 
     #[test]
     fn pictures_and_clips_are_limited() {
         let tested = record("hard:0..299", None);
-        let plans = Plans::of(Some(&Garden), &tested);
-        let mut drawer = Drawer::new(&plans);
-        let failure = Some(FailurePath { tester: "random".to_owned(), episode: 0, path: vec![[65, 3], [66, 1]] });
+        let drawings = Drawings::new(Plans::of(Some(&Garden), &tested), PictureFiles::default(), None, 0);
+        let mut drawer = Drawer::new(&drawings);
+        let failure = Some(EpisodePath { tester: "random".to_owned(), episode: 0, path: vec![[65, 3], [66, 1]] });
         let maps = LevelMaps { side: 1.0, columns: 64, rows: 16, failure, ..LevelMaps::default() };
         let mut clips = 0;
         for index in 0..300 {
@@ -222,10 +311,33 @@ mod tests {
             let drawn = drawer.draw(&LevelVerdict { maps, ..level(index, 0, 1, 0) });
             assert_eq!(drawn.is_some(), index < 200);
             let clip = drawn.and_then(|drawn| drawn.clip);
-            assert!(clip.as_ref().is_none_or(|clip| clip.starts_with("iVBORw0KGgo")), "the head of a PNG");
+            assert!(
+                clip.as_ref().is_none_or(|clip| clip.starts_with("data:image/png;base64,iVBORw0KGgo")),
+                "the head of a PNG"
+            );
             clips += usize::from(clip.is_some());
         }
         assert_eq!((drawer.pictures, drawer.maps, clips), (200, 100, MOST_CLIPS));
+    }
+
+    #[test]
+    fn unsolved_levels_have_the_squares_of_the_testers_and_solved_ones_have_none() {
+        let tested = record("hard:0..9", None);
+        let drawings = Drawings::new(Plans::of(Some(&Garden), &tested), PictureFiles::default(), None, 0);
+        let mut drawer = Drawer::new(&drawings);
+        let maps =
+            || Some(LevelMaps { side: 1.0, columns: 64, rows: 16, visits: vec![[65, 3]], ..LevelMaps::default() });
+        let mut draw = |level: LevelVerdict| drawer.draw(&level).expect("a plan");
+        let lost = draw(LevelVerdict { maps: maps(), ..level(0, 0, 1, 0) });
+        assert!(lost.picture.contains("class=\"hatched\""), "{}", lost.picture);
+        assert!(lost.reach.is_some_and(|words| words.starts_with("No tester reached ")));
+        let solved = draw(LevelVerdict { maps: maps(), ..level(1, 1, 1, 9) });
+        assert!(!solved.picture.contains("hatched") && solved.reach.is_none());
+        let unknown = draw(level(2, 0, 1, 0));
+        assert!(!unknown.picture.contains("hatched") && unknown.reach.is_none());
+        let card = drawer.draw_bare(&LevelVerdict { maps: maps(), ..level(3, 0, 1, 0) }).expect("a plan");
+        assert!(card.picture.contains("class=\"hatched\"") && !card.picture.contains("map visits"));
+        assert_eq!((drawer.reached, drawer.maps), (2, 2));
     }
 
     #[test]

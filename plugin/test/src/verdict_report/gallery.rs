@@ -1,9 +1,11 @@
 //! The gallery: all levels as small pictures, the worst first, which the script draws as they come into view.
 //!
-//! The page has the levels as JSON, and each different plan once, as letters: a page of 10,000 levels stays small.
+//! The page has the levels as JSON, and each different plan once, as [`PlanRows`]: a page of 10,000 levels stays small.
 
-use crate::verdict_report::{drawn::Plans, selection::Selection};
-use playbot_harness::floor_plan::FloorPlan;
+use crate::{
+    verdict::PlanRows,
+    verdict_report::{drawn::Plans, selection::Selection},
+};
 use playbot_report::whole;
 use serde::Serialize;
 use std::{collections::BTreeMap, fmt::Write};
@@ -36,7 +38,7 @@ pub(crate) fn gallery(overview: &str, selection: &Selection, plans: &Plans) -> S
     let (mut drawn, mut bytes) = (Vec::new(), 0);
     let mut thumbs = Vec::new();
     for level in levels {
-        let plan = if bytes < MOST_BYTES { plans.at(level.index).map(|plan| shortened(&plan)) } else { None };
+        let plan = if bytes < MOST_BYTES { plans.at(level.index).map(|plan| PlanRows::of(&plan).rows) } else { None };
         let plan = plan.map_or(-1, |plan| {
             *known.entry(plan).or_insert_with_key(|plan| {
                 bytes += plan.len();
@@ -66,29 +68,6 @@ pub(crate) fn gallery(overview: &str, selection: &Selection, plans: &Plans) -> S
     out
 }
 
-/// Returns a plan as its rows of letters, each letter once with the number of times that it follows itself, and `/`
-/// between rows: `12.3#S/16#`.
-fn shortened(plan: &FloorPlan) -> String {
-    let mut text = String::new();
-    for row in plan.rows() {
-        if !text.is_empty() {
-            text.push('/');
-        }
-        let mut letters = row.chars().peekable();
-        while let Some(letter) = letters.next() {
-            let mut count = 1;
-            while letters.next_if_eq(&letter).is_some() {
-                count += 1;
-            }
-            if count > 1 {
-                let _ = write!(text, "{count}");
-            }
-            text.push(letter);
-        }
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -96,19 +75,6 @@ mod tests {
         selection::SmallLevel,
         testing::{Garden, finding, level, record},
     };
-    use bevy::math::{Rect, Vec2};
-
-    #[test]
-    fn plans_are_short() {
-        let plan = FloorPlan {
-            bounds: Rect::new(0.0, 0.0, 16.0, 2.0),
-            walls: vec![Rect::new(0.0, 0.0, 16.0, 1.0), Rect::new(12.0, 1.0, 15.0, 2.0)],
-            start: Vec2::new(15.5, 1.5),
-            goal: Vec2::new(0.5, 1.5),
-            ..FloorPlan::default()
-        };
-        assert_eq!(shortened(&plan), "G11.3#S/16#");
-    }
 
     #[test]
     fn levels_of_one_plan_share_it_and_names_end_no_script() {

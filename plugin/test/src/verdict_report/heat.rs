@@ -29,26 +29,48 @@ pub(crate) fn layers(grid: &Grid, maps: &LevelMaps) -> String {
         return String::new();
     }
     let of = |class| STRENGTHS.map(|strength| Look::Strength(class, strength));
-    let visits = layer("visits", grid, maps, &of("visit"), |step| strong(&summed(maps, &maps.visits, step), fourfold));
-    let lost = layer("lost-time", grid, maps, &of("waste"), |step| strong(&summed(maps, &maps.lost, step), quarter));
+    let visits =
+        layer("map visits", grid, maps, &of("visit"), |step| strong(&summed(maps, &maps.visits, step), fourfold));
+    let lost =
+        layer("map lost-time", grid, maps, &of("waste"), |step| strong(&summed(maps, &maps.lost, step), quarter));
+    visits + &lost + &skill_layer("map skills", grid, maps)
+}
+
+/// Returns a group of these classes with counts of squares, stronger for more of them. The strongest colour is that of the
+/// largest count in `all`, so several layers have one scale.
+pub(crate) fn count_layer(
+    [classes, colour]: [&'static str; 2],
+    grid: &Grid,
+    maps: &LevelMaps,
+    counts: &[[u64; 2]],
+    all: &[&[[u64; 2]]],
+) -> String {
+    layer(classes, grid, maps, &STRENGTHS.map(|strength| Look::Strength(colour, strength)), |step| {
+        let most = all.iter().flat_map(|counts| summed(maps, counts, step).into_values()).max().unwrap_or(0);
+        let sums = summed(maps, counts, step).into_iter().filter(|(_, count)| *count > 0);
+        sums.map(|(place, count)| (place, quarter(count, most))).collect()
+    })
+}
+
+/// Returns a group of these classes with the skill that was active longest in each square.
+pub(crate) fn skill_layer(classes: &str, grid: &Grid, maps: &LevelMaps) -> String {
     let names = maps.skills.iter().take(SKILL_COLOURS).map(|known| known.skill.as_str()).chain(["other skills"]);
     let looks: Vec<Look> = names.enumerate().map(|(rank, name)| Look::Skill(rank, name)).collect();
     // A skill without its own colour belongs to the others, which come last.
     let last = looks.len() - 1;
-    let skills = layer("skills", grid, maps, &looks, |step| dominant(maps, step, last));
-    visits + &lost + &skills
+    layer(classes, grid, maps, &looks, |step| dominant(maps, step, last))
 }
 
 /// Returns a group of squares, each with one of the looks, in the finest form that is short enough.
 fn layer(
-    class: &str,
+    classes: &str,
     grid: &Grid,
     maps: &LevelMaps,
     looks: &[Look],
     squares: impl Fn(u64) -> BTreeMap<(u64, u64), usize>,
 ) -> String {
     let drawn = |step| {
-        let mut svg = format!("<g class=\"map {class}\">");
+        let mut svg = format!("<g class=\"{classes}\">");
         let blocks = blocks(grid, maps, step, &squares(step), looks.len());
         for (look, blocks) in looks.iter().zip(blocks) {
             let path = path(&stacked(blocks));

@@ -3,7 +3,7 @@
 use crate::{
     verdict::{Finding, LevelVerdict, TestRecord, TesterVerdict, missing_failure, rerun_commands},
     verdict_report::{
-        drawn::{Drawer, Drawn, Plans, walks},
+        drawn::{Drawer, Drawings, Drawn, walks},
         interval,
         picture::{map_legend, map_scope},
         selection::{Selection, problems},
@@ -45,16 +45,18 @@ const NEVER: f64 = 1e12;
 const MOST_LISTED: usize = 10;
 
 /// Writes the section of the page.
-pub(crate) fn level_table(record: &TestRecord, selection: &Selection, plans: &Plans, program: &str) -> String {
+pub(crate) fn level_table(record: &TestRecord, selection: &Selection, drawings: &Drawings, program: &str) -> String {
+    let plans = &drawings.plans;
     let mut rows = String::new();
-    let mut drawer = Drawer::new(plans);
+    let mut drawer = Drawer::new(drawings);
     for level in &selection.levels {
         let drawn = drawer.draw(level);
         rows += &level_row(record, level, program, drawn.as_ref());
     }
     let pictures = drawer.pictures;
     let mut out = String::from("<section>\n<h2 id=\"levels-heading\">Levels</h2>\n<p>The worst levels come first: ");
-    out += "most findings first, then the least solved, then the slowest.";
+    out += "those proved unsolvable, then the unsolved ones, then the others; among them those with the most findings, then the \
+            least solved, then the slowest.";
     if selection.left_out > 0 {
         let left_out = whole(selection.left_out as f64);
         let _ = write!(out, " {left_out} other levels are not worse than the last one here; all are in results.json.");
@@ -71,7 +73,7 @@ pub(crate) fn level_table(record: &TestRecord, selection: &Selection, plans: &Pl
     }
     out += "</p>\n";
     if pictures > 0 {
-        out += &map_legend(drawer.maps > 0);
+        out += &map_legend(drawer.maps > 0, drawer.reached > 0);
     }
     out + FILTER + HEAD + &rows + "</table></div>\n</section>\n"
 }
@@ -135,11 +137,12 @@ pub(crate) fn details(record: &TestRecord, level: &LevelVerdict, program: &str, 
         let more = if more > 0 { format!("<li>and {more} more</li>\n") } else { String::new() };
         let _ = write!(out, "<ul class=\"findings\">\n{listed}{more}</ul>\n");
     }
-    if let Some(Drawn { picture, axes, clip }) = drawn {
+    if let Some(Drawn { picture, axes, reach, clip }) = drawn {
         let clip = clip.as_ref().map_or_else(String::new, |clip| {
             format!("<button type=\"button\" class=\"clip\" data-clip=\"{clip}\" hidden>Play the failure</button>")
         });
         let _ = writeln!(out, "<figure>{picture}{clip}<figcaption class=\"key\">{axes}</figcaption></figure>");
+        reach.iter().for_each(|reach| out += &format!("<p>{reach}.</p>\n"));
     }
     if let Some(news) = level.recorded_news() {
         let _ = writeln!(out, "<p>{}.</p>", text(&news));
@@ -207,7 +210,11 @@ mod tests {
     use super::*;
     use crate::{
         verdict::MapScope,
-        verdict_report::testing::{level, record},
+        verdict_report::{
+            drawn::Plans,
+            files::PictureFiles,
+            testing::{level, record},
+        },
     };
     use playbot_harness::foreign::ForeignGame;
 
@@ -216,8 +223,9 @@ mod tests {
         let game = ForeignGame::new("garden", 1, |_: &mut bevy::prelude::App| {});
         let tested = TestRecord { maps: MapScope::All, ..record("default:0..0", None) };
         let plans = Plans::Known { game: &game, range: &tested.range };
+        let drawings = Drawings::new(plans, PictureFiles::default(), None, 0);
         let selection = Selection { levels: vec![level(0, 1, 2, 30)], left_out: 0, gallery: Vec::new(), all: 1 };
-        let words = level_table(&tested, &selection, &plans, "jump");
+        let words = level_table(&tested, &selection, &drawings, "jump");
         assert!(words.contains(WITHOUT_PLANS) && !words.contains("are kept for all levels"), "{words}");
     }
 }

@@ -60,7 +60,8 @@
     clip.alt = "The plan of the level, with a dot that follows the path of the failure";
     // A new address each time: a played clip would stay at its end.
     plays += 1;
-    clip.src = `data:image/png;base64,${button.dataset.clip}#${plays}`;
+    const source = button.dataset.clip;
+    clip.src = source.startsWith("data:") ? `${source}#${plays}` : `${source}?${plays}`;
     button.after(clip);
     button.textContent = "Stop";
   });
@@ -68,11 +69,11 @@
   for (const button of document.querySelectorAll("button.moving")) {
     const words = button.textContent;
     const picture = button.previousElementSibling;
-    const still = picture.src;
+    const still = picture.getAttribute("src");
     button.hidden = false;
     button.addEventListener("click", () => {
-      const moves = picture.src !== still;
-      picture.src = moves ? still : `data:image/png;base64,${picture.dataset.moving}`;
+      const moves = picture.getAttribute("src") !== still;
+      picture.src = moves ? still : picture.dataset.moving;
       button.textContent = moves ? words : "Stop";
     });
   }

@@ -5,6 +5,7 @@ use crate::{
     verdict_report::{
         ends,
         heat::{Block, Grid, layers, path, shape, stacked},
+        reach::Reached,
     },
 };
 use bevy::math::{Rect, Vec2};
@@ -15,6 +16,9 @@ use std::{cmp::Reverse, fmt::Write};
 /// Largest size of a drawing without the maps, bytes: a page has up to 200 of them.
 const MOST_BYTES: usize = 8_000;
 
+/// Largest size of the squares that were reached or not, bytes.
+const MOST_REACH: usize = 4_000;
+
 /// Largest number of squares with ends, those with the most ends.
 const MOST_SQUARES: usize = 40;
 
@@ -23,7 +27,9 @@ const STRENGTHS: [&str; 4] = [".3", ".5", ".7", ".9"];
 
 /// Returns the drawing as an SVG element in the colours of the page, and the ends of its axes in words. `None` for a plan
 /// without extent, or with too many parts for a page with many levels.
-pub(crate) fn picture(plan: &FloorPlan, level: &LevelVerdict) -> Option<(String, String)> {
+///
+/// `reached` lies below all else, for a level that no tester solved.
+pub(crate) fn picture(plan: &FloorPlan, level: &LevelVerdict, reached: Option<&Reached>) -> Option<(String, String)> {
     let side = plan.bounds.size().max_element() / END_SQUARES;
     let extent = extent(plan.bounds, side, &level.ends);
     let grid = Grid::new(extent)?;
@@ -33,6 +39,9 @@ pub(crate) fn picture(plan: &FloorPlan, level: &LevelVerdict) -> Option<(String,
         "<svg class=\"level\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{}\">",
         escape(&label)
     );
+    let reached = reached.map(|reached| reached.svg(&grid, MOST_REACH)).filter(|reached| !reached.is_empty());
+    let reached = reached.map_or_else(String::new, |reached| format!("<g class=\"map ends reach\">{reached}</g>"));
+    svg += &reached;
     for (class, areas) in [("wall", &plan.walls), ("platform", &plan.platforms), ("hazard", &plan.hazards)] {
         let blocks = areas.iter().filter(|area| is_finite(area)).filter_map(|area| grid.block(*area));
         shape(class, None, &path(&stacked(blocks.collect())), &mut svg);
@@ -55,7 +64,7 @@ pub(crate) fn picture(plan: &FloorPlan, level: &LevelVerdict) -> Option<(String,
         shape("goal", None, &format!("M{x} {}l9 9l-9 9l-9-9z", y - 9), &mut svg);
     }
     svg += "</svg>";
-    (svg.len() - maps.len() <= MOST_BYTES).then(|| (svg, scales(extent)))
+    (svg.len() - maps.len() - reached.len() <= MOST_BYTES).then(|| (svg, scales(extent)))
 }
 
 /// Returns the drawn area: the bounds of the plan, with room for agents that fell out of it.
@@ -134,6 +143,16 @@ const SWITCH: &str = "\
 </fieldset></form>
 ";
 
+/// Legend of levels that no tester solved.
+const REACH: &str = "\
+<ul class=\"legend\">
+<li><svg class=\"level\" viewBox=\"0 0 20 20\"><path class=\"reached\" d=\"M0 0h20v20h-20z\"/></svg>reached, in an \
+unsolved level</li>
+<li><svg class=\"level\" viewBox=\"0 0 20 20\"><path class=\"missed\" d=\"M0 0h20v20h-20z\"/><path class=\"hatched\" \
+fill=\"url(#hatch)\" d=\"M0 0h20v20h-20z\"/></svg>not reached, though no wall cuts it off from the start or from the goal</li>
+</ul>
+";
+
 /// Legend of the maps.
 const MAPS: &str = "\
 <ul class=\"legend words\">
@@ -145,9 +164,10 @@ rested or went back and forth; the stronger, the more</li>
 </ul>
 ";
 
-/// Returns the legend of pictures, with the switch if some have maps.
-pub(crate) fn map_legend(has_maps: bool) -> String {
-    if has_maps { format!("{MARKS}{SWITCH}{MAPS}") } else { MARKS.to_owned() }
+/// Returns the legend of pictures, with the switch if some have maps, and with reached squares if some show them.
+pub(crate) fn map_legend(has_maps: bool, has_reach: bool) -> String {
+    let reach = if has_reach { REACH } else { "" };
+    if has_maps { format!("{MARKS}{reach}{SWITCH}{MAPS}") } else { format!("{MARKS}{reach}") }
 }
 
 /// Returns a sentence that names the levels with maps; empty for results that are older than maps.
@@ -179,7 +199,7 @@ mod tests {
             ..SquareEnds::default()
         };
         let level = LevelVerdict { ends: ends.iter().map(end).collect(), ..level(0, 0, 9, 0) };
-        picture(&garden(), &level).expect("small").0
+        picture(&garden(), &level, None).expect("small").0
     }
 
     #[test]
@@ -205,12 +225,26 @@ mod tests {
         );
         let maps = LevelMaps { side: 1.0, columns: 64, rows: 16, visits: vec![[70, 9]], ..LevelMaps::default() };
         let level = LevelVerdict { maps: Some(maps), ..level(0, 0, 9, 0) };
-        let (svg, axes) = picture(&garden(), &level).expect("small");
+        let (svg, axes) = picture(&garden(), &level, None).expect("small");
         assert_eq!(axes, "x 0 to 64, y 0 to 16");
         for class in ["ends", "visits", "lost-time", "skills"] {
             assert_eq!(svg.matches(&format!("<g class=\"map {class}\">")).count(), 1, "{class} in {svg}");
         }
         assert!(svg.contains("<path class=\"visit\" opacity=\".85\" d=\"M60 140h10v10h-10z\"/>"), "{svg}");
+    }
+
+    #[test]
+    fn squares_of_an_unsolved_level_that_were_not_reached_are_hatched_with_the_ends() {
+        let maps = LevelMaps { side: 1.0, columns: 64, rows: 16, visits: vec![[65, 9]], ..LevelMaps::default() };
+        let reached = Reached::by_testers(&maps, &garden()).expect("open squares");
+        let (svg, _) = picture(&garden(), &level(0, 0, 9, 0), Some(&reached)).expect("small");
+        let (reach, rest) = svg.split_once("</g>").expect("a group");
+        assert!(
+            reach.ends_with("z\"/>") && reach.contains("<g class=\"map ends reach\"><path class=\"reached\""),
+            "{reach}"
+        );
+        assert!(reach.contains("class=\"hatched\" fill=\"url(#hatch)\"") && reach.len() < MOST_REACH + 200, "{reach}");
+        assert!(rest.starts_with("<path class=\"wall\""), "walls lie above: {rest}");
     }
 
     #[test]
@@ -235,8 +269,8 @@ mod tests {
             Rect::from_corners(corner, corner + 0.5)
         };
         let plan = FloorPlan { walls: (0..900).map(speck).collect(), ..garden() };
-        assert_eq!(picture(&plan, &level(0, 0, 1, 0)), None);
+        assert_eq!(picture(&plan, &level(0, 0, 1, 0), None), None);
         let flat = FloorPlan { bounds: Rect::default(), ..garden() };
-        assert_eq!(picture(&flat, &level(0, 0, 1, 0)), None);
+        assert_eq!(picture(&flat, &level(0, 0, 1, 0), None), None);
     }
 }

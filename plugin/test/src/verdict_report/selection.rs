@@ -22,12 +22,13 @@ pub struct Selection {
 }
 
 impl Selection {
-    /// Reads the results in a folder. Memory does not grow with their number.
-    pub fn read(folder: &Path) -> Result<Self, TestError> {
+    /// Reads the results in a folder, and calls `each` for each level. Memory does not grow with their number.
+    pub fn read(folder: &Path, each: &mut dyn FnMut(&LevelVerdict)) -> Result<Self, TestError> {
         let mut lines = ResultLines::open(folder)?;
         let (mut levels, mut gallery, mut all) = (Vec::new(), Vec::new(), 0_u64);
         while let Some(level) = lines.next_level()? {
             all += 1;
+            each(&level);
             gallery.push((Standing::of(&level), SmallLevel::of(&level, problems(&level))));
             if gallery.len() >= 2 * MOST_THUMBS {
                 keep_worst_small(&mut gallery);
@@ -72,12 +73,13 @@ impl Standing {
         Self { problems: problems(level), outcome: *outcome, solved, episodes, ticks, index: *index }
     }
 
-    /// Orders by more findings, then fewer solved episodes, then slower ones, then the order in the range.
+    /// Orders by the outcome, from proved unsolvable to solved, then by more findings, fewer solved episodes, slower ones,
+    /// and the order in the range. So no two levels are equal, and shards joined in any order give the same page.
     fn worst_first(&self, other: &Self) -> Ordering {
         let share = |a: &Self, b: &Self| u128::from(a.solved) * u128::from(b.episodes);
-        let findings = other.problems.cmp(&self.problems);
-        findings
-            .then_with(|| self.outcome.cmp(&other.outcome))
+        let outcomes = self.outcome.cmp(&other.outcome);
+        outcomes
+            .then_with(|| other.problems.cmp(&self.problems))
             .then_with(|| share(self, other).cmp(&share(other, self)))
             .then_with(|| other.ticks.total_cmp(&self.ticks))
             .then_with(|| self.index.cmp(&other.index))
@@ -125,15 +127,31 @@ mod tests {
     use crate::verdict_report::testing::{finding, level, record, tested};
 
     #[test]
-    fn findings_come_first_then_unsolved_levels_then_slow_ones() {
+    fn the_outcome_comes_first_then_findings_then_failures_then_slow_levels_then_the_number() {
         let found = LevelVerdict { findings: vec![finding("panic", "index out of bounds")], ..level(4, 2, 2, 10) };
-        let levels =
-            [level(0, 2, 2, 30), level(1, 2, 2, 90), level(2, 0, 2, 0), level(3, 1, 2, 10), found, level(5, 2, 2, 30)];
+        let proved = |index| LevelVerdict {
+            outcome: LevelOutcome::ProvedUnsolvable,
+            findings: vec![finding("unreachable-goal", "a wall")],
+            ..level(index, 0, 2, 0)
+        };
+        let twice = LevelVerdict { findings: [0; 2].map(|_| finding("stuck", "")).to_vec(), ..level(8, 0, 2, 0) };
+        let levels = [
+            level(0, 2, 2, 30),
+            level(1, 2, 2, 90),
+            level(2, 0, 2, 0),
+            level(3, 1, 2, 10),
+            found,
+            level(5, 2, 2, 30),
+            proved(6),
+            proved(7),
+            twice,
+            level(9, 0, 2, 0),
+        ];
         let parent = tempfile::tempdir().expect("a folder");
-        let folder = tested(parent.path(), "whole", &record("hard:0..5", None), &levels);
-        let selection = Selection::read(&folder).expect("results");
+        let folder = tested(parent.path(), "whole", &record("hard:0..9", None), &levels);
+        let selection = Selection::read(&folder, &mut |_| {}).expect("results");
         let order: Vec<u64> = selection.levels.iter().map(|level| level.index).collect();
-        assert_eq!((order, selection.left_out), (vec![4, 2, 3, 1, 0, 5], 0));
+        assert_eq!((order, selection.left_out), (vec![6, 7, 8, 2, 9, 4, 3, 1, 0, 5], 0));
     }
 
     #[test]

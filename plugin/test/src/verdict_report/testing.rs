@@ -112,7 +112,7 @@ pub(crate) fn level(index: u64, solved: u64, episodes: u64, ticks: u32) -> Level
         places: None,
         maps: None,
         reached: None,
-        testers: vec![TesterVerdict { tester: "random".to_owned(), score, exact: false, places: None }],
+        testers: vec![TesterVerdict { tester: "random".to_owned(), score, exact: false, places: None, events: None }],
         findings: Vec::new(),
         not_kept: None,
         too_short: Vec::new(),

@@ -3,7 +3,7 @@
 use crate::{
     findings::{RecordedCourse, testing::course},
     verdict::{
-        CommonStop, Comparison, FailurePath, FindingChange, LevelMaps, LevelVerdict, MapScope, Places, Shard,
+        CommonStop, Comparison, EpisodePath, FindingChange, LevelMaps, LevelVerdict, MapScope, Places, Shard,
         SkillTicks, SquareEnds, StopKind, TestError, TestRecord, TesterVerdict, TooShort, merge,
     },
     verdict_report::{
@@ -14,8 +14,15 @@ use crate::{
 };
 use std::{collections::BTreeMap, fs, path::PathBuf};
 
-const PLAIN: HtmlReport<'static> =
-    HtmlReport { game: Some(&Garden), comparison: None, program: "playbot", scenes: None };
+const PLAIN: HtmlReport<'static> = HtmlReport {
+    game: Some(&Garden),
+    comparison: None,
+    before: None,
+    program: "playbot",
+    scenes: None,
+    explorer: None,
+    split: false,
+};
 
 /// Makes the page of these levels of `hard:0..`.
 fn page(levels: &[LevelVerdict], report: &HtmlReport) -> String {
@@ -36,9 +43,14 @@ fn full_maps() -> LevelMaps {
         lost: (0..1024).map(|square| often(square + 3)).map(|[square, ticks]| [square - 3, ticks]).collect(),
         skills: (1..9).map(|number| SkillTicks { skill: format!("z{number}+"), ticks: 7 }).collect(),
         skill_at: (0..1024).map(|square| [square, often(square)[1] % 8]).collect(),
-        failure: Some(FailurePath { tester: "random".to_owned(), episode: 3, path }),
+        failure: Some(EpisodePath { tester: "random".to_owned(), episode: 3, path }),
         ..LevelMaps::default()
     }
+}
+
+/// Leaves out most visits of maps.
+fn few_visits(maps: LevelMaps) -> LevelMaps {
+    LevelMaps { visits: maps.visits.into_iter().take(100).collect(), ..maps }
 }
 
 /// Makes a level with everything that makes a page long.
@@ -127,7 +139,7 @@ fn a_thousand_long_levels_are_less_than_ten_megabytes() {
     assert_eq!(html.matches("viewBox=\"0 0 640 160\"").count(), 250, "the worst ones have pictures, and 50 findings");
     assert_eq!(html.matches("playbot test garden --levels hard:").count(), 1000, "all say how to see them");
     assert_eq!(html.matches("<g class=\"map visits\"><path").count(), 200, "and maps");
-    let clips = html.matches("data-clip=\"iVBORw0KGgo").count();
+    let clips = html.matches("data-clip=\"data:image/png;base64,iVBORw0KGgo").count();
     assert!((20..=60).contains(&clips), "{clips} clips");
     assert!(html.contains(" 200 of them have a picture here.") && html.contains("and 30 more in results.json"));
 }
@@ -179,12 +191,62 @@ fn nothing_of_what_files_and_games_say_becomes_markup() {
 
 #[test]
 fn the_page_loads_nothing() {
-    let html = page(&[long(0), level(1, 9, 9, 5)], &PLAIN);
-    for words in ["http:", "https:", "src=\"", "href=", "url(", "@import", "import("] {
+    let lost = LevelVerdict { maps: Some(full_maps()), ..level(2, 0, 9, 5) };
+    let html =
+        page(&[long(0), level(1, 9, 9, 5), LevelVerdict { maps: lost.maps.clone().map(few_visits), ..lost }], &PLAIN);
+    for words in ["http:", "https:", "src=\"", "href=", "@import", "import("] {
         assert!(!html.contains(words), "{words}");
     }
+    assert_eq!(html.matches("url(").count(), html.matches("url(#hatch)").count(), "the pattern is in the page");
+    assert_eq!((html.matches("id=\"hatch\"").count(), html.matches("fill=\"url(#hatch)").count()), (1, 2));
     // Clips are in the page, and shown by the script.
     assert!(html.contains("default-src 'none'") && html.contains("img-src data:") && html.contains("data-clip=\""));
+}
+
+#[test]
+fn a_split_page_has_its_pictures_in_files_and_a_whole_one_removes_them() {
+    let parent = tempfile::tempdir().expect("a folder");
+    let folder = tested(parent.path(), "whole", &record("hard:0..2", None), &[long(0), long(1), level(2, 9, 9, 5)]);
+    let (file, pictures) = (folder.join(REPORT), folder.join("report-files"));
+    let split = HtmlReport { split: true, ..PLAIN };
+    let written = |report: &HtmlReport| {
+        write_html(&folder, &file, report).expect("writable");
+        fs::read_to_string(&file).expect("it is there")
+    };
+    let page = written(&split);
+    let (_, clip) = page.split_once("data-clip=\"").expect("a clip");
+    let (clip, _) = clip.split_once('"').expect("an address");
+    assert!(fs::read(folder.join(clip)).expect("a file").starts_with(b"\x89PNG"), "{clip}");
+    // Both levels fail in the same way.
+    assert_eq!((page.matches("data-clip=").count(), fs::read_dir(&pictures).expect("a folder").count()), (2, 1));
+    assert!(!page.contains("base64,iVBOR") && page.contains("img-src data: 'self' file:"), "{page}");
+    let again = written(&split);
+    assert_eq!(page, again);
+    assert!(written(&PLAIN).contains("base64,iVBOR") && !pictures.exists());
+    fs::write(&pictures, "a file").expect("writable");
+    let error = write_html(&folder, &file, &split).expect_err("there is no folder").to_string();
+    assert!(error.contains("report-files"), "{error}");
+    assert!(fs::read_to_string(&file).expect("it is there").contains("base64,iVBOR"), "the page before is kept");
+}
+
+#[test]
+fn changed_levels_stand_side_by_side_on_the_page_of_a_comparison() {
+    let parent = tempfile::tempdir().expect("a folder");
+    let path = |square: u64| LevelVerdict {
+        maps: Some(LevelMaps {
+            best: Some(EpisodePath { tester: "random".to_owned(), episode: 0, path: vec![[65, 1], [square, 1]] }),
+            failure: None,
+            ..full_maps()
+        }),
+        ..level(0, 9, 9, 5)
+    };
+    let tested = |name: &str, square| tested(parent.path(), name, &record("hard:0..0", None), &[path(square)]);
+    let (before, now) = (tested("before", 66), tested("now", 67));
+    let comparison = Comparison::read(&before, &now).expect("comparable");
+    let with = |before| html(&now, &HtmlReport { comparison: Some(&comparison), before, ..PLAIN }).expect("results");
+    let page = with(Some(before.as_path()));
+    assert!(page.contains("<h2>Before and now</h2>") && page.contains("<p class=\"key\">another path</p>"), "{page}");
+    assert!(!with(None).contains("Before and now"));
 }
 
 #[test]

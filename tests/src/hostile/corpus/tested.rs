@@ -8,9 +8,10 @@ use playbot_harness::detector::LevelProof;
 use playbot_test::{
     findings::{CourseEnd, RecordedCourse},
     verdict::{
-        CommonStop, Comparison, Earlier, EpisodeScore, FailurePath, Finding, FinishTime, LevelMaps, LevelOutcome,
-        LevelVerdict, MapScope, Overview, Places, RESULTS, ReachedCells, ResultLines, Shard, SkillTicks, SquareEnds,
-        StopKind, TestFolder, TestRecord, TesterRecord, TesterVerdict, TooShort, merge, wilson, write_reports,
+        CommonStop, Comparison, Earlier, EpisodePath, EpisodeScore, Finding, FinishTime, LevelMaps, LevelOutcome,
+        LevelVerdict, MapScope, Overview, Places, PlanRows, RESULTS, ReachedCells, ResultLines, Shard, SkillTicks,
+        SquareEnds, StopKind, TestFolder, TestRecord, TesterEvents, TesterRecord, TesterVerdict, TooShort, merge,
+        wilson, write_reports,
     },
     verdict_report::{HtmlReport, html},
 };
@@ -90,7 +91,14 @@ fn score(solved: u64, episodes: u64) -> EpisodeScore {
 fn verdict(index: u64) -> LevelVerdict {
     let solved = index % 3;
     let places = Some(Places { visited: 3, open: 4 });
-    let tester = |name: &str| TesterVerdict { tester: name.to_owned(), score: score(solved, 4), exact: false, places };
+    let events = TesterEvents { ends: vec![[4, 2, 1]], lost: vec![[3, 9]], visited: vec![[3, 2]] };
+    let tester = |name: &str| TesterVerdict {
+        tester: name.to_owned(),
+        score: score(solved, 4),
+        exact: false,
+        places,
+        events: Some(events.clone()),
+    };
     let finding = Finding {
         detector: "stuck".to_owned(),
         tester: Some("random".to_owned()),
@@ -156,7 +164,9 @@ fn maps() -> LevelMaps {
         lost: vec![[3, 9]],
         skills: vec![SkillTicks { skill: "z1+".to_owned(), ticks: 71 }],
         skill_at: vec![[3, 0], [4, 0]],
-        failure: Some(FailurePath { tester: "random".to_owned(), episode: 1, path: vec![[3, 70], [4, 1]] }),
+        failure: Some(EpisodePath { tester: "random".to_owned(), episode: 1, path: vec![[3, 70], [4, 1]] }),
+        best: Some(EpisodePath { tester: "chaos".to_owned(), episode: 0, path: vec![[3, 2], [4, 1]] }),
+        plan: Some(PlanRows { side: 1.0, rows: "64./S62.G/64#".to_owned() }),
         ..LevelMaps::default()
     }
 }
@@ -197,5 +207,7 @@ fn handle(folder: &Path) {
     let _ = Overview::read(&test);
     let _ = write_reports(&test, comparison, "playbot");
     // Without an error it is the page, which is not checked here.
-    let _ = html(&test, &HtmlReport { game: Some(&GAME), comparison, program: "playbot", scenes: None });
+    let before = Some(before.as_path());
+    let report = HtmlReport { game: Some(&GAME), comparison, before, program: "playbot", ..HtmlReport::default() };
+    let _ = html(&test, &report);
 }
