@@ -47,6 +47,10 @@ struct HandMadeLevels;
 struct RecordingInBuilds;
 
 #[cfg(doctest)]
+#[doc = include_str!("../../docs/how-to/teach.md")]
+struct Teach;
+
+#[cfg(doctest)]
 #[doc = include_str!("../../docs/how-to/findings.md")]
 struct Findings;
 

@@ -15,6 +15,8 @@ mod planting;
 #[path = "../shared/program.rs"]
 mod program;
 mod pull_request;
+mod review;
+mod skills;
 mod switches;
 mod testing;
 mod trace;

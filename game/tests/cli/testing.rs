@@ -96,7 +96,7 @@ fn results_say_where_bots_went_and_what_killed_them() {
     let known = ["saw", "enemy", "lava", "left the map", "time"];
     assert!(!causes.is_empty() && causes.iter().all(|cause| known.contains(&cause.as_str())), "{causes:?}");
     let page = read(folder, "out/report.html");
-    assert!(page.contains("data-clip=\"iVBORw0KGgo") && page.contains("<form id=\"maps\""));
+    assert!(page.contains("data-clip=\"data:image/png;base64,iVBORw0KGgo") && page.contains("<form id=\"maps\""));
     // Results from before there were maps.
     let older: Vec<String> = unsealed(&read(folder, "out/results.json")).lines().map(without_maps).collect();
     fs::write(folder.join("out/results.json"), older.join("\n") + "\n").expect("writable");
@@ -154,6 +154,9 @@ fn without_maps(line: &str) -> String {
     let mut level: Value = serde_json::from_str(line.trim_end_matches(',')).expect("a level");
     for name in ["maps", "places", "causes"] {
         level.as_object_mut().expect("an object").remove(name);
+    }
+    for tester in level["testers"].as_array_mut().expect("testers") {
+        tester.as_object_mut().expect("an object").remove("events");
     }
     format!("{level}{comma}")
 }
@@ -387,6 +390,19 @@ fn the_page_has_pictures_of_the_levels_and_is_made_again_to_the_byte() {
     assert!(page.contains("playbot test coinrun --levels hard:"), "{page}");
     done(folder, &["report", "html", "out", "--out", "pages/again.html"]);
     assert!(read(folder, "pages/again.html") == page);
+    assert!(
+        page.contains("<h2>Events</h2>") && page.contains("<input type=\"checkbox\" value=\"lost\" checked>"),
+        "{page}"
+    );
+    // The same page with its clips as files.
+    done(folder, &["report", "html", "out", "--split", "--out", "pages/again.html"]);
+    let split = read(folder, "pages/again.html");
+    let clips = split.matches("data-clip=\"again-files/").count();
+    assert!(clips > 0 && clips == page.matches("data-clip=\"data:image/png;base64,").count(), "{split}");
+    let files = fs::read_dir(folder.join("pages/again-files")).expect("a folder").count();
+    assert!((1..=clips).contains(&files) && split.len() < page.len(), "{files} of {clips}");
+    done(folder, &["report", "html", "out", "--out", "pages/again.html"]);
+    assert!(read(folder, "pages/again.html") == page && !folder.join("pages/again-files").exists());
     let (_, words) = ended(folder, &["report", "html", "none"], 3);
     assert!(words.contains("none has no results.json"), "{words}");
     // For another version of the game there are numbers, and no pictures.
@@ -399,6 +415,30 @@ fn the_page_has_pictures_of_the_levels_and_is_made_again_to_the_byte() {
     assert!(words.contains("warning: the page has no pictures: version 0 of"), "{words}");
     let page = read(folder, "bare.html");
     assert!(page.contains("version 0 of `coinrun` was tested") && !page.contains("<figure>"), "{page}");
+}
+
+#[test]
+fn the_squares_of_an_unsolvable_level_that_nothing_reaches_are_hatched_on_any_number_of_threads() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    let page = |out: &str, rows: [&str; 4], threads: &str, wanted: i32| {
+        let level = serde_json::json!({ "rows": rows, "rules": "sparse+end-at-goal" });
+        fs::write(folder.join("a.json"), level.to_string()).expect("writable");
+        let plan = ["test", "maze2d", "--levels", "files:a.json", "--bot", "random", "--seed", "1", "--out", out];
+        ended(folder, &[&plan[..], &["--threads", threads]].concat(), wanted);
+        read(folder, &format!("{out}/report.html"))
+    };
+    let sealed = ["#######", "#SOO#G#", "#O#O###", "#######"];
+    let one = page("one", sealed, "1", 1);
+    assert!(
+        one.contains("Neither a tester nor an explorer reached 1 open square, which the picture has hatched."),
+        "{one}"
+    );
+    // On the card, and in the table.
+    let hatched =
+        |page: &str| page.matches("<path class=\"hatched\"").count() - page.matches("/>not reached, though").count();
+    assert!(hatched(&one) >= 2 && one.contains("<pattern id=\"hatch\""), "{one}");
+    assert!(page("two", sealed, "2", 1) == one, "threads change no byte");
 }
 
 #[test]

@@ -142,6 +142,24 @@ fn a_folder_that_is_deleted_is_waited_for() {
 }
 
 #[test]
+fn a_folder_without_levels_is_watched_until_the_first_one_is_saved() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let text = drawn(folder, "elsewhere.json");
+    let levels = ["--levels", "files:levels/*.json"];
+    let mut watch = Watch::start(folder, &levels);
+    let waiting = watch.errors.by_ref().map_while(Result::ok).find(|line| line.contains("matches no file"));
+    assert!(waiting.is_some_and(|line| line.ends_with(": waiting for the first one")));
+    fs::create_dir(folder.join("levels")).expect("writable");
+    fs::write(folder.join("levels/a.json"), text).expect("writable");
+    assert_eq!(watch.next_final("levels/a.json")["verdict"]["outcome"], "solved");
+    drop(watch);
+    fs::remove_dir_all(folder.join("levels")).expect("it is there");
+    let once = [&["watch", "coinrun", "--once"], &levels[..]].concat();
+    assert!(ended(folder, &once, 3).1.contains("files:levels/*.json matches no file"), "scripts do not wait");
+}
+
+#[test]
 fn levels_are_tested_once_for_scripts() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();

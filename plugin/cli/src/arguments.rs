@@ -17,6 +17,7 @@ use bevy_playbot::demo::file::{DemoFault, DemoFileError, DemoHeader, DemoWriter}
 use playbot_harness::{
     doctor::UnequalSteps,
     game::Game,
+    games::Games,
     held_out::is_only_level,
     machine::usable_threads,
     parallel::default_threads,
@@ -62,6 +63,26 @@ fn unequal_steps(game: &dyn Game, mode: &str, level: u64) -> Result<Option<Unequ
 
 fn report_panic(panic: &str) {
     report!("the game panicked: {panic}");
+}
+
+/// Returns the game of this name, or the only game of the program if none is named. `verb` says what is done with it,
+/// and `instead` what can be named in its place.
+///
+/// # Errors
+///
+/// The program has no such game, or it has several and none is named.
+pub(crate) fn named_or_only<'a>(
+    games: &Games<'a>,
+    name: Option<&str>,
+    verb: &str,
+    instead: &str,
+) -> Result<&'a dyn Game, CliError> {
+    let names: Vec<&str> = games.iter().map(|game| game.name()).collect();
+    match (name, names.as_slice()) {
+        (Some(name), _) => Ok(games.get(name)?),
+        (None, [_]) => Ok(games.first()),
+        (None, _) => Err(CliError::Usage(format!("name the game to {verb} ({}){instead}", names.join(", ")))),
+    }
 }
 
 /// More threads than any machine has cores.
@@ -218,7 +239,8 @@ pub struct LevelsArg {
     /// one of --level.
     #[arg(long, conflicts_with = "mode")]
     levels: Option<LevelSplit>,
-    /// Number of the level, also as mode:number, or its name in a level editor (default: 0, or the first of the levels).
+    /// Number of the level, also as mode:number, as files:path, or its name in a level editor (default: 0, or the first of
+    /// the levels).
     #[arg(long, value_name = "N")]
     level: Option<u64>,
 }
@@ -429,6 +451,23 @@ mod tests {
         let broken = ForeignGame::new("hop", 1, |_: &mut App| panic!("no track"));
         let broken = broken.keys([vec![], vec![KeyCode::Space]]).observe(["nothing"], || [0.0]);
         assert!(unequal_steps(&broken, "default", 0).is_err());
+    }
+
+    #[test]
+    fn a_game_needs_no_name_in_a_program_that_has_only_one() {
+        let game = |name| ForeignGame::new(name, 1, |_: &mut App| {});
+        let (hop, run) = (game("hop"), game("run"));
+        let one: [&dyn Game; 1] = [&hop];
+        let two: [&dyn Game; 2] = [&hop, &run];
+        let chosen = |games: &[&dyn Game], name| {
+            let games = Games::new(games).expect("different names");
+            let chosen = named_or_only(&games, name, "watch", ", or a file");
+            chosen.map(|game| game.name()).map_err(|error| error.to_string())
+        };
+        assert_eq!(chosen(&one, None), Ok("hop"));
+        assert_eq!(chosen(&two, Some("run")), Ok("run"));
+        assert_eq!(chosen(&two, None), Err("name the game to watch (hop, run), or a file".to_owned()));
+        assert!(chosen(&one, Some("run")).is_err_and(|words| words.contains("`run`")));
     }
 
     #[test]

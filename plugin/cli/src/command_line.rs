@@ -10,7 +10,8 @@ use crate::{
     progress::interrupt,
     verbs::{
         bench, bisect, bugs, completions, config, demo, doctor, eval, explore, eyes, history, init, learn_skills,
-        level, levels, play, policy, quickstart, record, replay, report, runs, study, test, trace, train, view, watch,
+        level, levels, play, policy, quickstart, record, replay, report, review, runs, skills, study, teach, test,
+        trace, train, view, watch,
     },
 };
 use bevy_playbot::unknown_name::{nearest, question};
@@ -18,7 +19,7 @@ use clap::{Arg, ArgAction, Command, CommandFactory, FromArgMatches, Parser, Subc
 use playbot_harness::{
     game::Game,
     games::Games,
-    level_files::{LevelFileError, is_level_files},
+    level_files::{LevelFileError, is_level_files, level_file_pattern},
     machine::usable_threads,
     parallel::default_threads,
     split::{LevelSplit, SplitError},
@@ -26,10 +27,11 @@ use playbot_harness::{
 use playbot_learner::{UnknownDevice, Workers, limit_by_environment};
 use std::{
     error::Error,
-    ffi::OsString,
+    ffi::{OsStr, OsString},
     io::IsTerminal,
     num::{IntErrorKind, ParseFloatError, ParseIntError},
     panic::AssertUnwindSafe,
+    path::Path,
     process::ExitCode,
 };
 
@@ -64,6 +66,7 @@ Examples:
   playbot test GAME --levels MODE:0..99 --out runs/test   which levels can be solved?
   playbot watch GAME --levels MODE:0..9   test levels while they are drawn
   playbot replay runs/test/findings/NAME.finding --apng failure.png   what was found
+  playbot review runs/test   keep or pin the findings one by one
   playbot policy export --run runs/first --out GAME.policy
   playbot config show --set ppo.lr=0.0003   an experiment with all its values
   playbot study --experiment my.ron --out study
@@ -83,6 +86,7 @@ enum Verb {
     Play(play::Args),
     Demo(demo::Args),
     Doctor(doctor::Args),
+    Teach(teach::Args),
     LearnSkills(learn_skills::Args),
     Train(train::Args),
     Study(study::Args),
@@ -91,6 +95,7 @@ enum Verb {
     Test(test::Args),
     Replay(replay::Args),
     Report(report::Args),
+    Review(review::Args),
     History(history::Args),
     Bisect(bisect::Args),
     Explore(explore::Args),
@@ -101,6 +106,7 @@ enum Verb {
     Levels(levels::Args),
     Trace(trace::Args),
     View(view::Args),
+    Skills(skills::Args),
     Watch(watch::Args),
     Bench(bench::Args),
     Bugs(bugs::Args),
@@ -150,7 +156,11 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
             // A request for help is no mistake; anything else is a wrong usage, which is 3 here.
             let code = if error.use_stderr() { 3 } else { 0 };
             let words = in_plain_words(&error).or_else(|| with_own_mode(&error, games));
-            match words.or_else(|| with_games(&error, games)) {
+            let words = words.or_else(|| with_games(&error, games));
+            let called: Vec<String> = std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
+            let tip = expanded_pattern(&called).filter(|_| error.use_stderr());
+            let words = tip.map(|tip| with_tip(words.as_deref(), &error, &tip)).or(words);
+            match words {
                 Some(words) => begin_report!("{words}"),
                 None => {
                     if let Err(refused) = error.print()
@@ -267,6 +277,7 @@ fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
     let threads = match &verb {
         Verb::Quickstart(args) => args.threads.count(),
         Verb::LearnSkills(args) => args.compute.threads(),
+        Verb::Teach(args) => args.compute.threads(),
         Verb::Train(args) => args.compute.threads(),
         Verb::Study(args) => args.compute.threads(),
         Verb::Eval(args) => args.compute.threads(),
@@ -289,6 +300,7 @@ fn run_on_threads(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
         Verb::Demo(args) => demo::run(args, games),
         Verb::Doctor(args) => doctor::run(args, games),
         Verb::LearnSkills(args) => learn_skills::run(args, games),
+        Verb::Teach(args) => teach::run(args, games),
         Verb::Train(args) => train::run(args, games),
         Verb::Study(args) => study::run(args, games),
         Verb::Config(args) => config::run(args, games),
@@ -296,6 +308,7 @@ fn run_on_threads(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
         Verb::Test(args) => test::run(&args, games),
         Verb::Replay(args) => replay::run(&args, games),
         Verb::Report(args) => report::run(&args, games),
+        Verb::Review(args) => review::run(&args, games),
         Verb::History(args) => history::run(&args),
         Verb::Bisect(args) => bisect::run(&args),
         Verb::Explore(args) => explore::run(args, games),
@@ -306,6 +319,7 @@ fn run_on_threads(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
         Verb::Levels(args) => levels::run(&args, games),
         Verb::Trace(args) => trace::run(args, games),
         Verb::View(args) => view::run(args, games),
+        Verb::Skills(args) => skills::run(args, games),
         Verb::Watch(args) => watch::run(&args, games),
         Verb::Bench(args) => bench::run(args, games),
         Verb::Bugs(args) => bugs::run(args, games),
@@ -352,6 +366,11 @@ fn with_level_numbers(args: Vec<OsString>, games: &[&dyn Game], command: &Comman
             numbered.push(arg);
             continue;
         };
+        if let Some(files) = called.files_of_one_level(option, value) {
+            numbered.extend(files);
+            replaced = (!words[place].contains('=')).then_some(place + 1);
+            continue;
+        }
         let texts = NumberedLevels::of(game, mode, value, option)?;
         let is_changed = texts.is_some();
         let texts = texts.unwrap_or_else(|| vec![value.to_owned()]);
@@ -449,6 +468,19 @@ impl<'a> CalledVerb<'a> {
         }
     }
 
+    /// Returns the options that name level files, in place of an option that takes the number of a level; `None` for
+    /// other values, and for options that take level files themselves.
+    fn files_of_one_level(&self, option: LevelsOption, value: &str) -> Option<Vec<OsString>> {
+        if option.takes_mode || !is_level_files(value) {
+            return None;
+        }
+        let options = match self.option("levels") {
+            Some(_) => vec![format!("--levels={value}")],
+            None => vec![format!("--mode={value}"), "--level=0".to_owned()],
+        };
+        Some(options.into_iter().map(OsString::from).collect())
+    }
+
     /// Returns what an option takes; `None` if the verb has no such option, or one that names a game before the levels.
     fn levels_option(&self, name: &str) -> Option<LevelsOption<'a>> {
         let arg = self.option(name.trim_start_matches('-')).filter(|_| self.verbs.first() != Some(&"bugs"))?;
@@ -489,6 +521,9 @@ impl NumberedLevels {
         let is_range = |text: &str| text.parse::<LevelSplit>().is_ok();
         if value.starts_with('-') || is_level_files(value) || is_range(value) {
             return Ok(None);
+        }
+        if let Err(error @ SplitError::MisspeltFiles { .. }) = value.parse::<LevelSplit>() {
+            return Err(error.to_string());
         }
         let default = mode.unwrap_or_else(|| default_mode(game));
         if is_range(&format!("any:{value}")) {
@@ -622,6 +657,42 @@ fn with_games(error: &clap::Error, games: &[&dyn Game]) -> Option<String> {
     let is_missing = error.kind() == ErrorKind::MissingRequiredArgument && text.contains(MISSING);
     let names: Vec<&str> = games.iter().map(|game| game.name()).collect();
     is_missing.then(|| text.replacen(MISSING, &format!("\n  <GAME>, one of {}\n", names.join(", ")), 1))
+}
+
+/// Returns the advice to quote a pattern, if the shell has made several files of one: further files stand behind a
+/// value of levels.
+fn expanded_pattern(words: &[String]) -> Option<String> {
+    let is_file = |word: &String| !word.starts_with('-') && (is_level_files(word) || Path::new(word).is_file());
+    let place = (1..words.len()).find(|place| {
+        let is_value = OF_LEVELS.iter().any(|name| words[place - 1] == *name);
+        is_value && is_file(&words[*place]) && words.get(place + 1).is_some_and(is_file)
+    })?;
+    let files = words[place..].iter().take_while(|word| is_file(word));
+    let paths: Vec<&Path> = files.map(|word| Path::new(level_file_pattern(word).unwrap_or(word))).collect();
+    let common = |part: fn(&Path) -> Option<&OsStr>| {
+        let first = part(paths[0])?.to_str()?;
+        paths.iter().all(|path| part(path).is_some_and(|own| own == first)).then(|| first.to_owned())
+    };
+    let folder = common(|path| path.parent().map(Path::as_os_str)).unwrap_or_else(|| "levels".to_owned());
+    let folder = if folder.is_empty() { String::new() } else { format!("{folder}/") };
+    let ending = common(Path::extension).map_or_else(String::new, |ending| format!(".{ending}"));
+    Some(format!(
+        "{} files stand behind {}, as if the shell had expanded a pattern: quote it, such as {} \"files:{folder}*{ending}\"",
+        paths.len(),
+        words[place - 1],
+        words[place - 1]
+    ))
+}
+
+/// Returns the text of an error with a tip, above the last line, which names the help.
+fn with_tip(words: Option<&str>, error: &clap::Error, tip: &str) -> String {
+    const LAST: &str = "\nFor more information";
+    let text = words.map_or_else(|| error.render().to_string(), str::to_owned);
+    let tip = format!("\n  tip: {tip}\n");
+    match text.rfind(LAST) {
+        Some(at) => format!("{}{tip}{}", &text[..at], &text[at..]),
+        None => format!("{text}{tip}"),
+    }
 }
 
 /// Replaces the mode of examples that are written for any game.
@@ -791,6 +862,47 @@ mod tests {
             let error = numbered(args).expect_err(args);
             assert!(error.contains(words), "{error}");
         }
+    }
+
+    #[test]
+    fn level_files_are_taken_wherever_a_single_level_is_named() {
+        for (args, wanted) in [
+            ("level rooms --level files:a.json", "level rooms --levels=files:a.json"),
+            ("trace plain --level=files:a/*.json:3 --actions 0", "trace plain --levels=files:a/*.json:3 --actions 0"),
+            ("doctor plain --level files:a.json", "doctor plain --mode=files:a.json --level=0"),
+            ("explore plain --level files:a.json", "explore plain --level files:a.json"),
+        ] {
+            assert_eq!(numbered(args).as_deref(), Ok(wanted));
+        }
+        for args in ["level plain --level file:a.json", "test rooms --levels file:a.json"] {
+            let words = numbered(args).expect_err(args);
+            assert!(words.ends_with("did you mean `files:a.json`?"), "{words}");
+        }
+    }
+
+    #[test]
+    fn files_of_a_pattern_that_the_shell_has_expanded_are_followed_by_advice() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = |name: &str| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, "{}").expect("writable");
+            path.to_str().expect("text").to_owned()
+        };
+        let (a, b, other) = (file("a.json"), file("b.json"), file("c.txt"));
+        let tip = |words: &[&str]| expanded_pattern(&words.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>());
+        let quoted = format!("--levels \"files:{}/*.json\"", folder.path().display());
+        let words = tip(&["playbot", "test", "rooms", "--levels", &a, &b, "--out", "o"]).expect("two files");
+        assert!(words.starts_with("2 files stand behind --levels") && words.ends_with(&quoted), "{words}");
+        let words = tip(&["playbot", "watch", "--level", &a, &b, &other]).expect("three files");
+        assert!(words.ends_with("/*\""), "{words}");
+        let words = tip(&["playbot", "watch", "--levels", "files:a.json", "files:b.json"]).expect("two patterns");
+        assert!(words.ends_with("\"files:*.json\""), "{words}");
+        for words in [&["playbot", "test", "--levels", &a][..], &["playbot", "test", "--levels", &a, "--out", &b]] {
+            assert_eq!(tip(words), None);
+        }
+        let error = Cli::command().try_get_matches_from(["playbot", "level", "a", "b"]).expect_err("one too many");
+        let text = with_tip(None, &error, "quote it");
+        assert!(text.contains("\n  tip: quote it\n\nFor more information"), "{text}");
     }
 
     #[test]

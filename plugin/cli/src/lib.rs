@@ -53,6 +53,7 @@ mod output;
 mod arguments;
 mod command_line;
 mod error;
+mod loopback;
 pub mod pictures;
 mod progress;
 pub mod reference;

@@ -21,7 +21,7 @@ use playbot_report::PlainTable;
 use playbot_test::verdict::TestError;
 use std::{
     fs::File,
-    io::{self, Write},
+    io::{self, IsTerminal, Write},
     path::{Path, PathBuf},
     sync::{Mutex, PoisonError, mpsc::Receiver},
 };
@@ -38,16 +38,36 @@ static DATA: Mutex<Option<File>> = Mutex::new(None);
 ///
 /// [`CliError::BrokenPipe`] if the reader is gone.
 pub(crate) fn print_line(line: impl std::fmt::Display) -> Result<(), CliError> {
-    let line = format!("{}\n", for_programs(&line.to_string()));
+    write_data(&format!("{}\n", for_programs(&line.to_string())))
+}
+
+fn write_data(text: &str) -> Result<(), CliError> {
     let mut data = DATA.lock().unwrap_or_else(PoisonError::into_inner);
     let written = match data.as_mut() {
-        Some(data) => data.write_all(line.as_bytes()),
-        None => io::stdout().lock().write_all(line.as_bytes()),
+        Some(data) => data.write_all(text.as_bytes()),
+        None => io::stdout().lock().write_all(text.as_bytes()),
     };
     written.map_err(|error| match error.kind() {
         io::ErrorKind::BrokenPipe => CliError::BrokenPipe,
         _ => CliError::Io(format!("cannot write to standard output: {error}")),
     })
+}
+
+/// Returns whether data is shown on a terminal.
+pub(crate) fn shows_on_terminal() -> bool {
+    match DATA.lock().unwrap_or_else(PoisonError::into_inner).as_ref() {
+        Some(data) => data.is_terminal(),
+        None => io::stdout().is_terminal(),
+    }
+}
+
+/// Prints a picture for a terminal, whose characters steer it.
+///
+/// # Errors
+///
+/// [`CliError::BrokenPipe`] if the reader is gone.
+pub(crate) fn print_picture(shown: &str) -> Result<(), CliError> {
+    write_data(shown)
 }
 
 /// Prints a table of data. On a terminal it is no wider than that, if words can be shortened; elsewhere it is whole.

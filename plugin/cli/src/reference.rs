@@ -7,10 +7,13 @@ use std::fmt::Write;
 /// The groups of verbs on the page, in the order of the page.
 const GROUPS: [(&str, &[&str]); 6] = [
     ("Begin", &["init"]),
-    ("Test levels", &["test", "doctor", "replay", "explore", "levels", "watch", "report", "history", "bisect", "bugs"]),
-    ("See levels and episodes", &["level", "trace", "view", "eyes", "play"]),
+    (
+        "Test levels",
+        &["test", "doctor", "replay", "review", "explore", "levels", "watch", "report", "history", "bisect", "bugs"],
+    ),
+    ("See levels and episodes", &["level", "trace", "view", "eyes", "skills", "play"]),
     ("Record", &["record", "demo"]),
-    ("Learn", &["quickstart", "learn-skills", "train", "study", "eval", "config", "runs", "policy", "bench"]),
+    ("Learn", &["quickstart", "teach", "learn-skills", "train", "study", "eval", "config", "runs", "policy", "bench"]),
     ("Use the shell", &["completions"]),
 ];
 

@@ -1,12 +1,12 @@
 //! The verbs of the command line: a module each, with its options (`Args`) and its `run`.
 //!
 //! - Begin: [`init`].
-//! - Test levels: [`mod@test`], [`doctor`], [`replay`], [`explore`], [`levels`], [`watch`], [`report`],
-//!   [`history`], [`bisect`], [`bugs`].
-//! - See levels and episodes: [`level`], [`trace`], [`view`], [`eyes`], [`play`].
+//! - Test levels: [`mod@test`], [`doctor`], [`replay`], [`review`], [`explore`], [`levels`], [`watch`],
+//!   [`report`], [`history`], [`bisect`], [`bugs`].
+//! - See levels and episodes: [`level`], [`trace`], [`view`], [`eyes`], [`skills`], [`play`].
 //! - Record: [`record`], [`demo`].
-//! - Learn: [`quickstart`], [`learn_skills`], [`train`], [`study`], [`eval`], [`config`], [`runs`], [`policy`],
-//!   [`bench`].
+//! - Learn: [`quickstart`], [`teach`], [`learn_skills`], [`train`], [`study`], [`eval`], [`config`], [`runs`],
+//!   [`policy`], [`bench`].
 //! - Use the shell: [`completions`].
 //!
 //! A verb reads its options, opens what they name, calls the library, and prints what comes back. Options that several
@@ -35,8 +35,11 @@ pub(crate) mod quickstart;
 pub(crate) mod record;
 pub(crate) mod replay;
 pub(crate) mod report;
+pub(crate) mod review;
 pub(crate) mod runs;
+pub(crate) mod skills;
 pub(crate) mod study;
+pub(crate) mod teach;
 pub(crate) mod test;
 pub(crate) mod trace;
 pub(crate) mod train;

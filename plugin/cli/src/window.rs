@@ -14,7 +14,9 @@
 //! - `playlist`: the order of the levels, and the result of the last episode.
 //! - `keys`: the window's own keys; `unbound`: keys of the person that no action holds; `devices`: the person's devices, kept from the game or handed on to it.
 //! - `camera`: the person's view from above; `solid`: the view in space.
-//! - `title`: the window's title, and pauses of game time.
+//! - `overlay`: what the agent does, over the picture.
+//! - `teaching`: F9 and F10, recordings and lessons.
+//! - `notice`: a notice in the title; `title`: the window's title, and pauses of game time.
 //! - `frames`: windows of games whose ticks are frames.
 //! - `ending`: the orderly end, after which the recording is whole; `error`: errors of opening and running.
 
@@ -25,13 +27,16 @@ mod ending;
 mod error;
 mod frames;
 mod keys;
+mod notice;
+mod overlay;
 mod playlist;
 #[cfg(feature = "view3d")]
 mod solid;
+mod teaching;
 mod title;
 mod unbound;
 
-use crate::window::{deciders::Deciders, ending::Verdict, error::catch};
+use crate::window::{deciders::Deciders, ending::Verdict, error::catch, teaching::Teaching};
 use bevy::{
     app::{PanicHandlerPlugin, PluginGroupBuilder, TerminalCtrlCHandlerPlugin},
     prelude::*,
@@ -48,7 +53,9 @@ use bevy_playbot::{
     episode::NoTimeLimit,
     headless::{set_fixed_step, set_frame_rate},
     key_bindings::{KeyBindings, KeyboardPlugin, MissingSet},
+    overlay::OverlayNames,
     placement::TickPlacement,
+    skill_prior::NamedSkill,
     virtual_input::VirtualInput,
     vision::{ObservationConfig, VisionError},
 };
@@ -58,7 +65,9 @@ use playbot_harness::{
 };
 use std::time::Duration;
 
-pub use crate::window::{deciders::Autopilot, error::WindowError, playlist::Playlist, unbound::UnboundKeys};
+pub use crate::window::{
+    deciders::Autopilot, error::WindowError, playlist::Playlist, teaching::TeachingSetup, unbound::UnboundKeys,
+};
 
 /// Width and height of the window at first: eleven pixels for each of the bots' 64.
 const SIDE: u32 = 704;
@@ -122,6 +131,7 @@ impl GameWindow {
         title::build_pace(&mut app);
         playlist::build(&mut app, game.tools().host.time_limit());
         title::build(&mut app, game.name(), Update);
+        overlay::build(&mut app, game, agent);
         let unbound = UnboundKeys::new(game);
         unbound::build(&mut app, unbound.clone());
         Ok(Self { app, agent, unrecorded: None, unbound })
@@ -163,6 +173,7 @@ impl GameWindow {
         ending::build(&mut app, stop);
         frames::build(&mut app, game.name(), hz);
         playlist::build(&mut app, game.tools().host.time_limit());
+        overlay::build(&mut app, game, agent);
         let unbound = UnboundKeys::new(game);
         unbound::build(&mut app, unbound.clone());
         Ok(Self { app, agent, unrecorded, unbound })
@@ -195,13 +206,19 @@ impl GameWindow {
 
     /// Records every episode from now on, of any decider. What a person does then reaches the game as its actions only.
     pub fn record(&mut self, writer: DemoWriter) {
-        self.app.insert_resource(Recorder::new(writer));
-        let mut agent = self.app.world_mut().entity_mut(self.agent);
-        agent.insert(Recording::default());
-        // Windows of games that are drawn here turn keys into actions by themselves.
-        if agent.contains::<VirtualInput>() && !agent.contains::<KeyBindings>() {
-            agent.insert((PressesForPeople, MissingSet::default()));
+        record_into(self.app.world_mut(), self.agent, writer);
+    }
+
+    /// Names regions of the autopilot's skills.
+    pub fn name_skills(&mut self, regions: Vec<NamedSkill>) {
+        if let Some(mut names) = self.app.world_mut().get_mut::<OverlayNames>(self.agent) {
+            names.skills = regions;
         }
+    }
+
+    /// Lets F9 record, and F10 learn from it.
+    pub fn teach(&mut self, setup: TeachingSetup) {
+        self.app.insert_resource(Teaching::new(setup, self.unrecorded));
     }
 
     /// Plays this episode first. After its end the person plays on.
@@ -237,6 +254,17 @@ pub struct WindowSetup<'a> {
     pub seed: u64,
     /// Returns true when the window must close; called every frame.
     pub stop: fn() -> bool,
+}
+
+/// Records every episode of the agent from its next one on.
+fn record_into(world: &mut World, agent: Entity, writer: DemoWriter) {
+    world.insert_resource(Recorder::new(writer));
+    let mut agent = world.entity_mut(agent);
+    agent.insert(Recording::default());
+    // Windows of games that are drawn here turn keys into actions by themselves.
+    if agent.contains::<VirtualInput>() && !agent.contains::<KeyBindings>() {
+        agent.insert((PressesForPeople, MissingSet::default()));
+    }
 }
 
 /// Adds the game and the autopilot's sensors. A panic of the game is its fault.

@@ -50,6 +50,41 @@ impl GameProgram {
         assert_eq!(verified["report"]["divergences"].as_array().map(Vec::len), Some(0), "{verified}");
     }
 
+    /// F9, F10 and Tab in a window: what a person plays is recorded, learned from in the background and played. The
+    /// window closes while it learns, and nothing is lost.
+    pub fn a_window_learns_while_one_plays(&self) {
+        let (desk, shell) = (Desk::new(self.program), Shell::new(self.program));
+        let mut seat = desk.open(shell.folder(), &["play", self.game, "--levels", "0..1"]);
+        seat.tap("F10");
+        seat.read("nothing is recorded yet");
+        seat.tap("F9");
+        seat.read("recording, 0 episodes");
+        for _ in 0..4 {
+            seat.hold(&[self.key]);
+            seat.pass_ticks(20);
+            seat.release(&[self.key]);
+            seat.pass_ticks(20);
+        }
+        seat.tap("F10");
+        seat.read("lesson: ");
+        seat.read("by imitation");
+        seat.tap("Tab");
+        seat.read("the learned policy plays");
+        seat.pass_ticks(10);
+        seat.tap("Tab");
+        seat.read("you play");
+        seat.tap("Escape");
+        let (status, said) = seat.leave();
+        assert!(status.success(), "{said}");
+
+        let recording = format!("{}.demo", self.game);
+        let verified = shell.answer(&["demo", "verify", &recording, "--json"]);
+        assert_eq!(verified["report"]["divergences"].as_array().map(Vec::len), Some(0), "{verified}");
+        let policy = format!("{}.lessons/learned.policy", self.game);
+        let shown = shell.answer(&["policy", "show", &policy, "--json"]);
+        assert_eq!(shown["card"]["game"], self.game, "{shown}");
+    }
+
     /// `play --record` in a window that is minimised while a key is held: the key is let go of, time goes on, and the
     /// recording replays.
     pub fn a_hidden_window_holds_no_key_and_plays_on(&self) {

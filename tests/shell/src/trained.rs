@@ -7,6 +7,7 @@ use serde_json::Value;
 use crate::{
     at_work::{at_work, kill},
     game_program::{GameProgram, UPDATES},
+    output::{ended, json_lines},
     run_folder::{logged, results},
     shell::Shell,
 };
@@ -42,6 +43,43 @@ impl GameProgram {
         assert!(metrics == resumed[0], "killing it changed the metrics");
         assert!(weights == resumed[1], "killing it changed the weights");
         assert!(arenas == resumed[2], "killing it changed what its arenas do");
+    }
+
+    /// `teach`: a policy by imitation, better ones by training, and the same command goes on where it was. With
+    /// `--until-input-ends` it stops with its input, and loses nothing.
+    pub fn a_lesson_is_given_and_goes_on(&self) {
+        let shell = self.with_recording();
+        let few = ["arenas=2", "worlds=2", "skills.epochs=2", "ppo.num_steps=64", "ppo.minibatches=2"];
+        let sets = few.iter().flat_map(|set| ["--set", *set]);
+        let teach: Vec<&str> = ["teach", self.game, "--demos", "few.demo", "--out", "lessons", "--json"].into();
+        let teach: Vec<&str> = teach.into_iter().chain(sets).collect();
+        // The test's own input is empty.
+        let (said, _) = ended(shell.command(&[&teach[..], &["--until-input-ends", "--steps", "512"]].concat()), 130);
+        let events = |lines: &[Value], event: &str| lines.iter().filter(|line| line["event"] == event).count();
+        let stopped = json_lines(&said);
+        assert_eq!((events(&stopped, "stopped"), events(&stopped, "finished")), (1, 0), "{stopped:?}");
+
+        let lines = shell.answers(&[&teach[..], &["--steps", "512"]].concat());
+        assert_eq!((events(&lines, "stopped"), events(&lines, "finished")), (0, 1), "{lines:?}");
+        let policies: Vec<&Value> = lines.iter().filter(|line| line["event"] == "policy").collect();
+        assert!(policies.iter().all(|policy| policy["file"] == "lessons/learned.policy"), "{policies:?}");
+        assert_eq!(policies.first().map(|policy| &policy["stage"]), Some(&"imitation".into()), "{policies:?}");
+        let card = &shell.answer(&["policy", "show", "lessons/learned.policy", "--json"])["card"];
+        assert_eq!(card["game"], self.game, "{card}");
+
+        // A longer lesson goes on, and does not imitate again.
+        let lines = shell.answers(&[&teach[..], &["--steps", "1024"]].concat());
+        let steps: Vec<u64> =
+            lines.iter().filter(|line| line["stage"] == "training").filter_map(|line| line["done"].as_u64()).collect();
+        assert_eq!((steps.first(), steps.last()), (Some(&640), Some(&1024)), "{lines:?}");
+        let imitated = lines.iter().any(|line| line["stage"] == "imitation");
+        assert!(!imitated, "{lines:?}");
+        // Other settings are refused, with what differs.
+        let (_, refused) =
+            ended(shell.command(&[&teach[..], &["--steps", "1024", "--set", "ppo.lr=0.01"]].concat()), 3);
+        assert!(refused.contains("ppo.lr"), "{refused}");
+        let (_, refused) = ended(shell.command(&["teach", self.game, "--demos", "none.demo", "--out", "lessons"]), 3);
+        assert!(refused.contains("none.demo"), "{refused}");
     }
 
     /// `eval` of the demonstrator, of a run and of the policy file that `policy export` makes of it, which plays the

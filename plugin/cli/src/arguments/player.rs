@@ -61,6 +61,15 @@ pub struct PlayerArgs {
     device: Device,
 }
 
+impl PlayerArgs {
+    /// Returns the file with names of the policy's skills: in the folder of the run, or beside the policy. `None` for a
+    /// bot.
+    pub fn names_file(&self) -> Option<PathBuf> {
+        let of_run = self.run.as_ref().map(|run| run.join("skill-names.json"));
+        of_run.or_else(|| self.policy.as_ref().map(|policy| policy.with_extension("skill-names.json")))
+    }
+}
+
 /// A player, its name and its observation.
 pub struct LoadedPlayer {
     /// Its name in messages.

@@ -59,14 +59,15 @@ impl Caption {
             let reward = readable(f64::from(step.reward));
             write(screen, &format!("reward {reward}"), letter, (column, second), UP);
         }
-        self.bars(screen, second + self.line(), &step.skill);
+        self.bars(screen, second + self.line(), &step.skill, step.skill_name.as_deref());
     }
 
-    fn bars(&self, screen: &mut Screen, top: usize, skill: &[f32]) {
+    fn bars(&self, screen: &mut Screen, top: usize, skill: &[f32], name: Option<&str>) {
         if skill.is_empty() {
             return;
         }
-        write(screen, &format!("skill, bars full at ±{FULL}"), self.letter, (MARGIN, top), FAINT);
+        let words = name.map_or_else(|| format!("skill, bars full at ±{FULL}"), |name| format!("skill: {name}"));
+        write(screen, &words, self.letter, (MARGIN, top), FAINT);
         let (middle, room) = (top + self.line() + BAR, screen.width - 2 * MARGIN);
         screen.block(MARGIN, middle, room, 1, FAINT);
         let step = room / skill.len();

@@ -6,9 +6,11 @@ use bevy_playbot::{
     demo::{file::DemoEpisode, replay::Divergence},
     engine::{Renewal, panics::PanicReports},
     policy::Decision,
+    skill_prior::NamedSkill,
     vision::ObservationConfig,
 };
 use playbot_harness::{eval::Player, game::Game, prelude::*, worlds::build_observing_world};
+use playbot_learner::{ObsKind, Observations, SkillDraw};
 use std::sync::Arc;
 
 /// Observation and action of an agent in one tick.
@@ -25,6 +27,8 @@ pub struct EpisodeStep {
     pub value: Option<f32>,
     /// Its skill; empty if there is none.
     pub skill: Vec<f32>,
+    /// Name of the region in which the skill lies, if it has one.
+    pub skill_name: Option<String>,
     /// Its reward.
     pub reward: f32,
 }
@@ -34,6 +38,7 @@ pub struct EpisodeWorld {
     world: World,
     agent: Entity,
     action_names: Vec<String>,
+    skill_names: Vec<NamedSkill>,
     level: u64,
     ticks: u32,
     over: bool,
@@ -109,7 +114,15 @@ impl EpisodeWorld {
         // The sensor for pictures has replaced the vector, which a player may read.
         let vector = VectorSensor::new(game.observation().names);
         world.entity_mut(agent).insert((vector, LevelQueue::Always(level)));
-        Ok(Self { world, agent, action_names: game.tools().input.action_names(), level, ticks: 0, over: false })
+        Ok(Self {
+            world,
+            agent,
+            action_names: game.tools().input.action_names(),
+            skill_names: Vec::new(),
+            level,
+            ticks: 0,
+            over: false,
+        })
     }
 
     /// Plays one tick; `None` after the end.
@@ -130,11 +143,42 @@ impl EpisodeWorld {
         Ok(Some(step))
     }
 
+    /// Names regions of skills.
+    pub fn name_skills(&mut self, regions: Vec<NamedSkill>) {
+        self.skill_names = regions;
+    }
+
+    /// Follows a skill from the next tick on, for so many ticks.
+    pub fn follow(&mut self, z: &[f32], ticks: u32) {
+        self.world.entity_mut(self.agent).insert(ActiveSkill { z: z.to_vec(), ticks_left: ticks });
+    }
+
+    /// Draws a skill from a prior, as it would be drawn in the next tick, which is played.
+    ///
+    /// # Errors
+    ///
+    /// The game broke its contract, or the prior was made for other observations.
+    pub fn draw_skill(
+        &mut self,
+        prior: &SkillPrior,
+        draw: SkillDraw,
+        normal: &mut dyn FnMut() -> f32,
+    ) -> Result<Vec<f32>, CliError> {
+        self.world.tick()?;
+        let kind = prior.prior.observation().unwrap_or(ObsKind::Vector(0));
+        let mut observations = Observations::empty(&kind);
+        if let Some(observation) = self.world.get::<Observation>(self.agent) {
+            observation.push_to(&mut observations);
+        }
+        Ok(prior.prior.sample(&observations, 1, draw, &mut |_| normal())?)
+    }
+
     /// Returns the step after a tick, in which an agent still carries the observation that it acted on.
     fn step(&self) -> EpisodeStep {
         let agent = self.world.entity(self.agent);
         let by_policy = agent.get::<Control>() == Some(&Control::Policy);
         let decided = agent.get::<Decision>().filter(|_| by_policy);
+        let skill = agent.get::<ActiveSkill>().map(|skill| skill.z.clone()).unwrap_or_default();
         EpisodeStep {
             tick: self.ticks,
             image: agent.get::<Observation>().map(|seen| seen.image.clone()).unwrap_or_default(),
@@ -142,7 +186,8 @@ impl EpisodeWorld {
             action: agent.get::<Action>().map(|action| self.describe(&action.0)).unwrap_or_default(),
             // A policy without a critic has the value 0 everywhere.
             value: decided.map(|decision| decision.value).filter(|value| *value != 0.0),
-            skill: agent.get::<ActiveSkill>().map(|skill| skill.z.clone()).unwrap_or_default(),
+            skill_name: NamedSkill::name_of(&self.skill_names, &skill).map(str::to_owned),
+            skill,
             reward: agent.get::<Reward>().map_or(0.0, Reward::get),
         }
     }

@@ -71,12 +71,24 @@ impl PlotFile {
 pub(crate) fn write(file: &PlotFile, picture: &LevelPicture, tick_hz: f64) -> Result<(), CliError> {
     match picture {
         LevelPicture::Drawing(drawing) => file.write(drawing),
-        LevelPicture::Pixels { image, pixels } => {
+        LevelPicture::Pixels { .. } => {
             let path = file.path();
             output::png(&path.to_string_lossy())
                 .map_err(|why| CliError::Usage(format!("{}: {why}", path.display())))?;
-            output::write(path, &Film::new(*image, 1, tick_hz)?.still(pixels)?.0)
+            output::write(path, &png(picture, tick_hz)?)
         }
+    }
+}
+
+/// Encodes the picture of a level as a PNG.
+///
+/// # Errors
+///
+/// It is too large.
+pub(crate) fn png(picture: &LevelPicture, tick_hz: f64) -> Result<Vec<u8>, CliError> {
+    match picture {
+        LevelPicture::Drawing(drawing) => to_png(drawing),
+        LevelPicture::Pixels { image, pixels } => Ok(Film::new(*image, 1, tick_hz)?.still(pixels)?.0),
     }
 }
 

@@ -179,7 +179,12 @@ pub(crate) fn exit_code() -> u8 {
     128 + FIRST.load(Ordering::SeqCst)
 }
 
-/// Returns true if Ctrl-C was pressed.
+/// Asks the work to stop at its next safe point, without a limit of time.
+pub(crate) fn ask() {
+    ASKED.store(true, Ordering::SeqCst);
+}
+
+/// Returns true if Ctrl-C was pressed, or the work was asked to stop otherwise.
 pub(crate) fn asked() -> bool {
     ASKED.load(Ordering::SeqCst)
 }

@@ -23,6 +23,7 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:
   playbot level GAME --mode MODE --level 7
   playbot level GAME --levels MODE:7
+  playbot level GAME --levels files:levels/a.json
   playbot level GAME --level 0 --json --out my-level.json
   playbot level GAME --level 7 --png level.png
   playbot level GAME --file my-level.json

@@ -23,8 +23,11 @@ pub use crate::verbs::play::window::run;
 #[command(after_help = "Keys:
   those of the game, printed at the start
   Tab        hand over to the policy or bot, and take over again
+  F9         record what you play (into GAME.demo, or the file of --record), and end it
+  F10        learn from the recording in the background, and stop it; Tab then hands over to what was learned so far
   R, N       play the level again, go to the next one
   P          pause
+  F8         hide the overlay and show it: what decides, action, value, skill, and notes of detectors
   -, =       see more, see less
   V          from above or in space, if the game has that view and the program the feature view3d
   Escape     end, as do Ctrl-Q and closing the window

@@ -126,6 +126,9 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     }
     let shown = shorter.as_ref().map_or(&finding, |(Minimised { finding, .. }, _)| finding);
     pictures.write(game, shown)?;
+    if !pictures.are_wanted() && !args.window && !args.json {
+        report!("to see it, add --png FILE for its last tick, --apng FILE for all ticks, or --window");
+    }
     if args.window {
         show(game, shown)?;
         if interrupt::asked() {
@@ -162,7 +165,12 @@ fn check_out(args: &Args) -> Result<(), CliError> {
     output::prepare(out)
 }
 
-fn play_again(game: &dyn Game, finding: &StoredFinding) -> Result<Recheck, CliError> {
+/// Plays a finding again, with a progress bar.
+///
+/// # Errors
+///
+/// It cannot be played.
+pub(crate) fn play_again(game: &dyn Game, finding: &StoredFinding) -> Result<Recheck, CliError> {
     let bar = progress::bar("replay", finding.episode.len() as u64, "ticks");
     let again = recheck(game, finding, &Checks::of_game(game));
     bar.finish_and_clear();
@@ -216,9 +224,9 @@ impl ReplayReport<'_> {
         })
     }
 
-    fn sentence(&self) -> String {
-        let StoredFinding { header, head, episode } = self.finding;
-        let who = head.tester.as_ref().map_or_else(String::new, |tester| format!(", played by {tester}"));
+    /// Describes the finding in a line, and whether it happens again in another one.
+    pub fn sentence(&self) -> String {
+        let StoredFinding { head, .. } = self.finding;
         let at = |tick: Option<u32>| tick.map_or_else(String::new, |tick| format!(" at tick {tick}"));
         let now = match self.again.status(self.finding) {
             FindingStatus::StillThere => format!("it happens again{}, with the same state", at(head.tick)),
@@ -232,11 +240,9 @@ impl ReplayReport<'_> {
             }
             FindingStatus::Gone | FindingStatus::Unplayable => "it does not happen any more".to_owned(),
         };
-        let ticks =
-            if episode.is_empty() { String::new() } else { format!(" ({})", counted(episode.len() as u64, "tick")) };
         let edited =
             self.edited.map_or_else(String::new, |path| format!("; the level file {path} has changed since the test"));
-        format!("{} {}{who}{ticks}: {}: {}\n{now}{edited}", header.game, head.level, head.detector, head.message)
+        format!("{}\n{now}{edited}", described(self.finding))
     }
 
     fn shorter_sentence(&self) -> Option<String> {
@@ -262,6 +268,15 @@ impl ReplayReport<'_> {
             counted(shorter.replays.into(), "replay")
         ))
     }
+}
+
+/// Describes a finding in a line.
+pub(crate) fn described(finding: &StoredFinding) -> String {
+    let StoredFinding { header, head, episode } = finding;
+    let by = head.tester.as_ref().map_or_else(String::new, |tester| format!(", played by {tester}"));
+    let ticks =
+        if episode.is_empty() { String::new() } else { format!(" ({})", counted(episode.len() as u64, "tick")) };
+    format!("{} {}{by}{ticks}: {}: {}", header.game, head.level, head.detector, head.message)
 }
 
 /// Leaves out needless actions, with a progress bar, and writes the rest. Its level is named as in `stored`: it may

@@ -4,20 +4,17 @@ use crate::{
     arguments::open,
     error::{CliError, Outcome},
     output,
-    output::{print_line, print_table, program},
+    output::{print_line, print_table},
     pictures::plot::PlotFile,
-    verbs::test::{Results, SceneMaker, report_results},
+    verbs::test::{Results, report_results, write_page},
 };
-use playbot_harness::games::Games;
+use playbot_harness::{games::Games, parallel::default_threads};
 use playbot_mutation::calibration::{Calibration, CalibrationError};
 use playbot_test::{
     verdict::{Comparison, IssueForm, RESULTS, ResultLines, TestRecord, issues, merge, results_folder},
-    verdict_report::{HtmlReport, REPORT, without_pictures, write_html},
+    verdict_report::{REPORT, without_pictures},
 };
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::{fs, path::PathBuf};
 
 /// Work with the results of tests.
 #[derive(clap::Args)]
@@ -71,6 +68,9 @@ pub struct MergeArgs {
     /// Folder of earlier results of the same version of the game, to report changes.
     #[arg(long, value_name = "DIR")]
     against: Option<PathBuf>,
+    /// Write the game's pictures and the clips of the page into DIR/report-files instead of into the page.
+    #[arg(long)]
+    split: bool,
     /// Replace existing results.
     #[arg(long)]
     force: bool,
@@ -89,7 +89,8 @@ pub(crate) fn run_merge(args: &MergeArgs, games: &Games) -> Result<Outcome, CliE
     // Without the game there are no pictures, and all else is the same.
     let game = games.get(&record.game).ok();
     let against = args.against.as_deref().map(results_folder);
-    let results = Results { folder: &args.out, against, game, json: args.json, keeps_failures: false };
+    let (folder, json, split, threads) = (args.out.as_path(), args.json, args.split, default_threads());
+    let results = Results { folder, against, game, json, keeps_failures: false, split, threads };
     results.check()?;
     // Nothing is written if the comparison fails.
     if let Some(before) = results.against {
@@ -130,7 +131,8 @@ fn check_out(args: &MergeArgs, shards: &[PathBuf]) -> Result<(), CliError> {
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot report html runs/test
-  playbot report html runs/test --against runs/before --out levels.html")]
+  playbot report html runs/test --against runs/before --out levels.html
+  playbot report html runs/test --split")]
 pub struct HtmlArgs {
     /// Folder of the results.
     #[arg(value_name = "DIR")]
@@ -141,6 +143,9 @@ pub struct HtmlArgs {
     /// File to write, an .html (default: report.html in the folder of the results). An existing page is replaced.
     #[arg(long, value_name = "FILE", value_parser = output::html)]
     out: Option<PathBuf>,
+    /// Write the game's pictures and the clips into a folder beside the page, such as report-files, instead of into the page.
+    #[arg(long)]
+    split: bool,
 }
 
 pub(crate) fn run_html(args: &HtmlArgs, games: &Games) -> Result<Outcome, CliError> {
@@ -160,11 +165,9 @@ pub(crate) fn run_html(args: &HtmlArgs, games: &Games) -> Result<Outcome, CliErr
         }
         report!("warning: the page has no pictures: {why}");
     }
-    let maker = game.map(SceneMaker::new);
-    let scene = |file: &Path| maker.as_ref()?.scene(file);
-    let program = program::name();
-    let report = HtmlReport { game, comparison: comparison.as_ref(), program, scenes: Some(&scene) };
-    write_html(folder, &file, &report).map_err(|error| {
+    let (split, threads) = (args.split, default_threads());
+    let results = Results { folder, against: before, game, json: false, keeps_failures: false, split, threads };
+    write_page(&results, comparison.as_ref(), &file).map_err(|error| {
         output::with_advice(
             error,
             "the results are unchanged: make room or rights there, or name another file with --out",

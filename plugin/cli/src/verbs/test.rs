@@ -13,7 +13,9 @@ mod scenes;
 mod testers;
 
 use crate::{
-    arguments::{Compute, check_start_and_steps, default_tested, experiment::quoted, report_agents_along},
+    arguments::{
+        Compute, check_start_and_steps, default_tested, experiment::quoted, named_or_only, report_agents_along,
+    },
     error::{CliError, Outcome},
     progress,
     progress::interrupt,
@@ -39,10 +41,10 @@ use std::{
 
 pub(crate) use crate::verbs::test::{
     regress::{DetectorArgs, list_detectors},
-    scenes::SceneMaker,
     testers::TesterArgs,
 };
 
+pub(crate) use crate::verbs::test::results::write_page;
 pub use crate::verbs::test::results::{Results, report_results};
 
 /// Test levels: report which of them bots and policies solve, and which are unsolvable.
@@ -101,6 +103,9 @@ pub struct Args {
     /// Folder for the results (not with --regress).
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Write the game's pictures and the clips of the page into DIR/report-files instead of into the page (not with --regress).
+    #[arg(long)]
+    split: bool,
     /// Go on with a test that was stopped or killed, or begin it if there is none.
     #[arg(long, conflicts_with = "force")]
     resume: bool,
@@ -128,18 +133,11 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     if let Some(outcome) = args.regress.run(games, &args.detectors, args.compute.threads(), args.json) {
         return outcome;
     }
-    let only = games.iter().map(|game| game.name()).next().filter(|_| games.iter().count() == 1);
-    let Some(name) = args.game.as_deref().or(only) else {
-        let names: Vec<&str> = games.iter().map(|game| game.name()).collect();
-        return Err(CliError::Usage(format!(
-            "name the game to test ({}), or a folder of findings with --regress",
-            names.join(", ")
-        )));
-    };
+    let game = named_or_only(games, args.game.as_deref(), "test", ", or a folder of findings with --regress")?;
     let Some(out) = &args.out else {
+        let name = game.name();
         return Err(CliError::Usage(format!("name a folder for the results with --out, such as --out runs/{name}")));
     };
-    let game = games.get(name)?;
     report_agents_along(game);
     let plan = plan(args, game)?;
     let record = plan.record(game);
@@ -148,7 +146,8 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
         path => (None, path.map(results_folder)),
     };
     let keeps_failures = args.findings.keep_failures;
-    let results = Results { folder: out, against, game: Some(game), json: args.json, keeps_failures };
+    let (json, split, threads) = (args.json, args.split, args.compute.threads());
+    let results = Results { folder: out, against, game: Some(game), json, keeps_failures, split, threads };
     results.check()?;
     args.history.as_deref().map(|file| check_history(file, game)).transpose()?;
     let recorded = recording.map(|recording| RecordedWins::read(game, &plan, recording)).transpose()?;

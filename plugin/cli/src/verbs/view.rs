@@ -18,7 +18,7 @@ use crate::{
     },
     progress,
     progress::interrupt,
-    verbs::view::written_picture::WrittenPicture,
+    verbs::{skills::names::SkillNames, view::written_picture::WrittenPicture},
 };
 use bevy_playbot::{
     demo::file::{DemoEpisode, DemoFileError, DemoReader},
@@ -182,7 +182,8 @@ fn open_episode(game: &dyn Game, args: &Args, games: &Games) -> Result<Opened, C
     let observation_config = observation_config(game, args, Some(&chosen))?;
     check_start(game, mode, level)?;
     let seed = args.levels.random_seed(args.seed);
-    let episode_world = EpisodeWorld::playing(game, mode, &observation_config, level, &chosen.player, seed)?;
+    let mut episode_world = EpisodeWorld::playing(game, mode, &observation_config, level, &chosen.player, seed)?;
+    episode_world.name_skills(SkillNames::of_player(&args.player)?.regions);
     Ok(Opened { episode_world, observation_config, mode: mode.to_owned(), player: chosen.name })
 }
 

@@ -15,7 +15,7 @@ mod saves;
 mod solutions;
 
 use crate::{
-    arguments::{Compute, at_least_one_step, default_tested, report_agents_along},
+    arguments::{Compute, at_least_one_step, default_tested, named_or_only, report_agents_along},
     error::{CliError, Outcome},
     output::{print_line, program},
     progress::interrupt,
@@ -33,8 +33,8 @@ use crate::{
 use playbot_harness::{
     game::{Game, read_level_designs},
     games::Games,
-    level_files::{is_level_files, level_files_mode},
-    split::LevelSplit,
+    level_files::{LevelFileError, is_level_files, level_files_mode},
+    split::{LevelSplit, SplitError},
 };
 use playbot_report::counted;
 use playbot_test::{
@@ -60,12 +60,13 @@ const PORT: u16 = 7788;
 /// Watch levels while they are drawn: on each save, test what has changed and show it on a page.
 ///
 /// The quickest testers come first: the actions that solved the level before, bots, and an explorer if none of them solves
-/// it. The terminal and a page on this machine show the verdict, the way that solves the level, or the places that nobody
-/// reaches, and what is new since the save before. The page is at http://127.0.0.1:7788, brings itself up to date, and
-/// goes back to any save.
+/// it. The terminal and a page on this machine show the verdict, the path that solves the level, or the places that no
+/// tester reaches, and what is new since the save before. The page is at http://127.0.0.1:7788, brings itself up to date,
+/// and goes back to any save.
 ///
-/// Level files are read again when they are saved. Other levels are tested again by a new process of the program: when a
-/// file of --assets was saved, as a level editor does, and with --rebuild when one of --code was.
+/// Level files are read again when they are saved. Without any, the watch waits for the first one. Other levels are tested
+/// again by a new process of the program: when a file of --assets was saved, as a level editor does, and with --rebuild
+/// when one of --code was.
 ///
 /// With --once all levels are tested once. Exit code 1 if one of them is unsolved or has a finding.
 #[derive(clap::Args)]
@@ -79,7 +80,7 @@ pub struct Args {
     game: Option<String>,
     /// Levels, as files:pattern, as mode:first..last, both included, or by their names in a level editor (default: those
     /// that `test` takes).
-    #[arg(long, visible_alias = "level")]
+    #[arg(long, visible_alias = "level", value_parser = watched_levels)]
     levels: Option<LevelSplit>,
     #[command(flatten)]
     testers: TesterArgs,
@@ -116,13 +117,16 @@ pub struct Args {
     json: bool,
 }
 
+/// Parses levels to watch. Files of a pattern need not be there yet.
+fn watched_levels(text: &str) -> Result<LevelSplit, SplitError> {
+    match text.parse() {
+        Err(SplitError::Files(LevelFileError::NoFiles { .. })) => Ok(LevelSplit::one(text, 0)),
+        levels => levels,
+    }
+}
+
 pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
-    let only = games.iter().map(|game| game.name()).next().filter(|_| games.iter().count() == 1);
-    let Some(name) = args.game.as_deref().or(only) else {
-        let names: Vec<&str> = games.iter().map(|game| game.name()).collect();
-        return Err(CliError::Usage(format!("name the game to watch ({})", names.join(", "))));
-    };
-    let game = games.get(name)?;
+    let game = named_or_only(games, args.game.as_deref(), "watch", "")?;
     if args.detectors.list_detectors {
         return list_detectors(game, args.json);
     }
@@ -149,7 +153,7 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     if let Some(page) = &page {
         report!(
             "{} is at {}",
-            if page.is_other { "the port is taken, so the page" } else { "the page" },
+            if page.is_other() { "the port is taken, so the page" } else { "the page" },
             page.address()
         );
     }
@@ -161,9 +165,11 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     match (is_files, args.once) {
         (true, false) => watch.files(&LevelFiles::new(&split)?),
         (true, true) => {
-            let files = LevelFiles::new(&split)?;
-            let paths: Vec<String> = files.look().0.into_keys().collect();
-            watch.once(paths.into_iter().map(|path| (LevelSplit::one(level_files_mode(&path), 0), path)), None)
+            let (files, problem) = LevelFiles::new(&split)?.look();
+            if let Some(problem) = problem {
+                return Err(CliError::Usage(problem.to_string()));
+            }
+            watch.once(files.into_keys().map(|path| (LevelSplit::one(level_files_mode(&path), 0), path)), None)
         }
         (false, true) => {
             let levels = split.levels().map(|level| LevelSplit::one(split.mode.clone(), level));
@@ -208,17 +214,20 @@ impl Watch<'_> {
         // Those of an earlier watch may be gone.
         let mut shown = self.saves.levels();
         let mut is_gone = false;
+        let mut is_begun = false;
         while !interrupt::asked() {
             let (now, problem) = files.look();
             let mut save = Save::new(self.saves.next());
             if problem.is_some() != is_gone {
                 is_gone = problem.is_some();
-                match &problem {
-                    Some(problem) => report!("{problem}: waiting until there are some again"),
-                    None => report!("there are level files again"),
+                let until = if is_begun { "until there are some again" } else { "for the first one" };
+                save.problem = problem.map(|problem| format!("{problem}: waiting {until}"));
+                match &save.problem {
+                    Some(problem) => report!("{problem}"),
+                    None => report!("there are level files now"),
                 }
-                save.problem = problem.map(|problem| format!("{problem}: waiting until there are some again"));
             }
+            is_begun |= !is_gone;
             for (path, stamp) in &now {
                 if known.get(path) != Some(stamp) {
                     due.insert(path.clone(), Instant::now());

@@ -34,6 +34,12 @@ impl Deciders {
         Self { agent, autopilot }
     }
 
+    /// Replaces the autopilot, which is installed already. Returns whether it was not this one before.
+    pub fn set_autopilot(&mut self, name: &str, control: Control) -> bool {
+        let before = self.autopilot.replace((name.to_owned(), control));
+        before.is_none_or(|(before, _)| before != name)
+    }
+
     /// Returns the decider after a change; `None` without an autopilot.
     pub fn other(&self, control: Control) -> Option<Control> {
         let (_, autopilot) = self.autopilot.as_ref()?;

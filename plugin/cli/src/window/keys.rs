@@ -5,7 +5,10 @@ use crate::window::{
     camera::Zoom,
     deciders::{Deciders, OwnKeys, OwnKeysRead},
     ending::Ending,
-    title::{Notice, Pace},
+    notice::Notice,
+    playlist::leave_level,
+    teaching::teach,
+    title::Pace,
 };
 use bevy::{
     ecs::{
@@ -14,7 +17,6 @@ use bevy::{
     },
     prelude::*,
 };
-use bevy_playbot::{engine::flush_unfinished, fault::Faults};
 use playbot_harness::prelude::*;
 
 pub(super) fn build(app: &mut App) {
@@ -23,7 +25,7 @@ pub(super) fn build(app: &mut App) {
 
 /// Returns the systems of the keys.
 pub(super) fn systems() -> ScheduleConfigs<ScheduleSystem> {
-    (hand_over, change_level, other_keys).into_configs()
+    (teach, hand_over, change_level, other_keys).chain()
 }
 
 /// Makes V explain itself, where another build of the program has a view in space of the game.
@@ -53,7 +55,8 @@ fn hand_over(
             // A skill that was drawn for another state does not fit this one.
             skill.ticks_left = 0;
         }
-        None => notice.say("no autopilot to hand over to: start with --policy, --run or --bot"),
+        None => notice
+            .say("no autopilot to hand over to: F9 records and F10 learns, or start with --policy, --run or --bot"),
     }
 }
 
@@ -68,19 +71,6 @@ fn change_level(keys: Res<OwnKeys>, mut playlist: ResMut<Playlist>, mut pace: Re
     }
     pace.go_on();
     commands.queue(leave_level);
-}
-
-/// Leaves the running level; a recording keeps what was played of it, as aborted.
-fn leave_level(world: &mut World) {
-    if let Err(error) = flush_unfinished(world) {
-        world.resource_mut::<Faults>().report(error.to_string());
-    }
-    let (agent, queue) = (world.resource::<Deciders>().agent, world.resource::<Playlist>().queue());
-    let mut agent = world.entity_mut(agent);
-    agent.insert(queue);
-    if let Some(mut episode) = agent.get_mut::<Episode>() {
-        episode.abandon();
-    }
 }
 
 /// Pauses with P, zooms with plus and minus, ends with Escape and Ctrl-Q.

@@ -2,7 +2,7 @@
 
 use crate::window::deciders::Deciders;
 use bevy::prelude::*;
-use bevy_playbot::episode::EpisodeResult;
+use bevy_playbot::{engine::flush_unfinished, episode::EpisodeResult, fault::Faults};
 use playbot_harness::prelude::*;
 use playbot_report::counted;
 
@@ -26,6 +26,12 @@ impl Playlist {
     /// Returns the mode of the levels.
     pub fn mode(&self) -> &str {
         &self.levels.mode
+    }
+
+    /// Returns the levels that a policy for this window trains on: at most 64 of them.
+    pub fn trained(&self) -> LevelSplit {
+        let last = self.levels.last.min(self.levels.first.saturating_add(63));
+        LevelSplit { last, ..self.levels.clone() }
     }
 
     /// Goes on to the next level.
@@ -87,6 +93,19 @@ fn note_end(
     }
     if let Ok(mut queue) = queues.get_mut(deciders.agent) {
         *queue = playlist.queue();
+    }
+}
+
+/// Leaves the running level; a recording keeps what was played of it, as aborted.
+pub(super) fn leave_level(world: &mut World) {
+    if let Err(error) = flush_unfinished(world) {
+        world.resource_mut::<Faults>().report(error.to_string());
+    }
+    let (agent, queue) = (world.resource::<Deciders>().agent, world.resource::<Playlist>().queue());
+    let mut agent = world.entity_mut(agent);
+    agent.insert(queue);
+    if let Some(mut episode) = agent.get_mut::<Episode>() {
+        episode.abandon();
     }
 }
 

@@ -1,6 +1,12 @@
 //! The window's title: level, tick, decider and state of the game.
 
-use crate::window::{Playlist, deciders::Deciders, playlist::LastEpisode};
+use crate::window::{
+    Playlist,
+    deciders::Deciders,
+    notice::{Notice, age_notice},
+    playlist::LastEpisode,
+    teaching::Teaching,
+};
 use bevy::{
     app::{RunFixedMainLoop, RunFixedMainLoopSystems},
     ecs::schedule::ScheduleLabel,
@@ -12,10 +18,7 @@ use bevy::{
 use bevy_playbot::{engine::TappedKeys, episode::Tick, vision::VisionSystems};
 use playbot_harness::prelude::*;
 use playbot_report::counted;
-use std::{borrow::Cow, time::Duration};
-
-/// Time for which a notice is shown.
-const NOTICE: Duration = Duration::from_secs(3);
+use std::time::Duration;
 
 /// Writes the title in `schedule`.
 pub(super) fn build(app: &mut App, game: &'static str, schedule: impl ScheduleLabel) {
@@ -28,30 +31,6 @@ pub(super) fn build(app: &mut App, game: &'static str, schedule: impl ScheduleLa
 #[reflect(Resource)]
 struct GameName(&'static str);
 
-/// A notice for the person.
-#[derive(Resource, Default, Reflect)]
-#[reflect(Resource)]
-pub(super) struct Notice {
-    words: Option<Cow<'static, str>>,
-    age: Duration,
-}
-
-impl Notice {
-    /// Shows these words for a while.
-    pub fn say(&mut self, words: impl Into<Cow<'static, str>>) {
-        *self = Self { words: Some(words.into()), age: Duration::ZERO };
-    }
-}
-
-fn age_notice(clock: Res<Time<Real>>, mut notice: ResMut<Notice>) {
-    if notice.words.is_some() {
-        notice.age += clock.delta();
-        if notice.age > NOTICE {
-            notice.words = None;
-        }
-    }
-}
-
 /// Formats with as many decimals as needed, at most two.
 fn to_cents(value: f64) -> String {
     // Adding 0 takes the sign from what rounds to nothing.
@@ -62,7 +41,7 @@ fn write_title(
     game: Res<GameName>,
     playlist: Res<Playlist>,
     (pace, last, notice): (Res<Pace>, Res<LastEpisode>, Res<Notice>),
-    recorder: Option<Res<Recorder>>,
+    (recorder, teaching): (Option<Res<Recorder>>, Option<Res<Teaching>>),
     deciders: Res<Deciders>,
     agents: Query<(&Control, &Episode)>,
     mut window: Single<&mut Window, With<PrimaryWindow>>,
@@ -79,10 +58,11 @@ fn write_title(
         Some(recorder) => format!("recording, {}", counted(recorder.episodes(), "episode")),
         None => "not recording".to_owned(),
     });
+    parts.extend(teaching.and_then(|teaching| teaching.words()));
     if pace.is_paused() {
         parts.push("PAUSED".to_owned());
     }
-    parts.extend(notice.words.as_deref().map(str::to_owned));
+    parts.extend(notice.words().map(str::to_owned));
     let title = parts.join(" · ");
     if window.title != title {
         window.title = title;

@@ -1,6 +1,6 @@
 //! Keys and buttons of a person that no action holds: reported at once, and counted for the end of a recording.
 
-use crate::window::title::Notice;
+use crate::window::notice::Notice;
 use bevy::prelude::*;
 use bevy_playbot::{action::Action, engine::TickSchedules, key_bindings::MissingSet, virtual_input::VirtualButton};
 use playbot_harness::prelude::*;

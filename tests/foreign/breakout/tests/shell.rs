@@ -20,6 +20,10 @@ playbot_shell::tests!(
     planted_defects_are_scored,
 );
 
+#[cfg(feature = "screen")]
+playbot_shell::tests!(GAME: a_window_learns_while_one_plays);
+playbot_shell::tests!(GAME: a_lesson_is_given_and_goes_on);
+
 /// The sound has a stand-in, so its file is not looked for.
 #[test]
 fn no_file_is_missed() {

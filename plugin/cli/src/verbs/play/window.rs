@@ -5,8 +5,8 @@ use crate::{
     error::{CliError, Outcome},
     output::program,
     progress::interrupt,
-    verbs::{demo::deciders, play::Args},
-    window::{Autopilot, GameWindow, Playlist, UnboundKeys, WindowSetup},
+    verbs::{demo::deciders, play::Args, skills::names::SkillNames},
+    window::{Autopilot, GameWindow, Playlist, TeachingSetup, UnboundKeys, WindowSetup},
 };
 use bevy_playbot::{
     demo::file::{DemoHeader, DemoSummary},
@@ -17,10 +17,11 @@ use playbot_harness::{
     game::{Game, without_idle_action},
     games::Games,
     level_files::is_level_files,
+    parallel::default_threads,
     split::LevelSplit,
 };
 use playbot_report::counted;
-use std::path::Path;
+use std::{ffi::OsString, path::Path};
 
 /// The last level where the game does not limit them: levels have 32 bits.
 const LAST_LEVEL: u64 = u32::MAX as u64;
@@ -32,6 +33,11 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let (autopilot, observation_config) = autopilot(game, &args)?;
     check_time_limit(game, &args)?;
     let header = header(game, playlist.mode(), &args);
+    let recording = args.record.clone().unwrap_or_else(|| format!("{}.demo", game.name()).into());
+    let has_pictures = observation_config.is_image();
+    let command = lesson(game, &args, &playlist, &recording)?;
+    let teaching = TeachingSetup { recording: recording.clone(), header: header.clone(), command, has_pictures };
+    let recorded_before = length(&recording);
     let seed = args.seed.unwrap_or(0);
     let mut window =
         GameWindow::open(WindowSetup { game, playlist, autopilot, observation_config, seed, stop: interrupt::asked })?;
@@ -40,6 +46,8 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         window.check_recording()?;
         window.record(args.overwrite.open(path, header)?);
     }
+    window.teach(teaching);
+    window.name_skills(SkillNames::of_player(&args.autopilot)?.regions);
     if args.no_time_limit {
         window.lift_time_limit();
     }
@@ -47,8 +55,8 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     window.announce(announcement(game, &args));
     let unbound = window.unbound_keys();
     window.run()?;
-    if let Some(path) = &args.record {
-        conclude(path, &unbound)?;
+    if args.record.is_some() || length(&recording) != recorded_before {
+        conclude(&recording, &unbound)?;
     }
     // A signal ends the program as it ends any other verb. A person who is done presses Escape.
     Ok(if interrupt::asked() { Outcome::Stopped } else { Outcome::Pass })
@@ -98,6 +106,27 @@ fn autopilot(game: &dyn Game, args: &Args) -> Result<(Option<Autopilot>, Observa
     })
 }
 
+/// Returns the command that learns from the recording in the background. It leaves one core to the window.
+fn lesson(game: &dyn Game, args: &Args, playlist: &Playlist, recording: &Path) -> Result<Vec<OsString>, CliError> {
+    let program = std::env::current_exe()
+        .map_err(|error| CliError::Io(format!("this program's own path is unknown: {error}")))?;
+    let threads = (default_threads() - 1).max(1).to_string();
+    let words = ["teach", game.name(), "--json", "--until-input-ends", "--threads", &threads].map(OsString::from);
+    let mut command = vec![program.into_os_string()];
+    command.extend(words);
+    let folder = recording.with_extension("lessons");
+    command.extend(["--demos".into(), recording.into(), "--out".into(), folder.into_os_string()]);
+    if args.levels.is_some() || args.mode.is_some() {
+        command.extend(["--set".into(), format!("train={}", playlist.trained()).into()]);
+    }
+    Ok(command)
+}
+
+/// Returns the length of a file in bytes; `None` if there is none.
+fn length(path: &Path) -> Option<u64> {
+    std::fs::metadata(path).ok().map(|file| file.len())
+}
+
 fn header(game: &dyn Game, mode: &str, args: &Args) -> DemoHeader {
     let header = game.demo_header(mode);
     DemoHeader { demonstrator: args.name.clone(), ..header }
@@ -132,7 +161,7 @@ fn announcement(game: &dyn Game, args: &Args) -> Vec<String> {
     if args.autopilot.is_named() {
         lines.push("Tab hands over and takes over again".to_owned());
     } else {
-        lines.push("there is no autopilot to hand over to: name a --policy, a --run or a --bot".to_owned());
+        lines.push("there is no autopilot yet: F9 records, F10 learns from it, and Tab hands over".to_owned());
     }
     lines
 }

@@ -47,13 +47,18 @@ impl Pictures<'_> {
         self.still.into_iter().chain(self.animated).try_for_each(output::prepare)
     }
 
+    /// Returns whether there are any.
+    pub fn are_wanted(&self) -> bool {
+        self.still.is_some() || self.animated.is_some()
+    }
+
     /// Draws and writes them.
     ///
     /// # Errors
     ///
     /// The game cannot be drawn, the pictures are too large, or the disk fails.
     pub fn write(&self, game: &dyn Game, finding: &StoredFinding) -> Result<(), CliError> {
-        if self.still.is_none() && self.animated.is_none() {
+        if !self.are_wanted() {
             return Ok(());
         }
         let seen_as = seen_as(game);
@@ -65,14 +70,14 @@ impl Pictures<'_> {
         let film = film(game, &seen_as, self.scale, &reach)?;
         if let Some(path) = self.still {
             output::write(path, &film.captioned(last)?.0)?;
-            report!("{} shows tick {}", path.display(), last.tick);
+            report!("picture: {} shows tick {}", path.display(), last.tick);
         }
         if let Some(path) = self.animated {
             let bar = progress::bar("draw", steps.len() as u64, "frames");
             let drawn = film.animated(&steps, || bar.inc(1));
             bar.finish_and_clear();
             output::write(path, &drawn?.0)?;
-            report!("{} shows ticks {} to {}", path.display(), steps[0].tick, last.tick);
+            report!("animation: {} shows ticks {} to {}", path.display(), steps[0].tick, last.tick);
         }
         Ok(())
     }
@@ -86,10 +91,29 @@ impl Pictures<'_> {
         };
         for path in self.still.into_iter().chain(self.animated) {
             plot::write(&PlotFile::new(path)?, &level, game.tick_hz())?;
-            report!("{} shows the level: {why}", path.display());
+            report!("picture: {} shows the level: {why}", path.display());
         }
         Ok(())
     }
+}
+
+/// Returns a picture of the last tick of a finding as a PNG whose longer side has about `length` pixels.
+/// Of a finding before the end of the first tick it is the level; `None` if the game draws none.
+///
+/// # Errors
+///
+/// The game cannot be drawn, or the picture is too large.
+pub(crate) fn last_tick(game: &dyn Game, finding: &StoredFinding, length: u32) -> Result<Option<Vec<u8>>, CliError> {
+    const NUMBERS: u32 = 3;
+    let seen_as = seen_as(game);
+    let (steps, reach) = play(game, finding, &seen_as, 1, &mut |_, _| {})?;
+    let Some(last) = steps.last() else {
+        let level = picture_of(game, &finding.header.mode, finding.episode.level_seed);
+        return level.map(|level| plot::png(&level, game.tick_hz())).transpose();
+    };
+    let side = seen_as.image.width.max(seen_as.image.height).max(1);
+    let scale = if seen_as.is_image() { (length / side).clamp(1, 32) } else { NUMBERS };
+    Ok(Some(film(game, &seen_as, scale, &reach)?.captioned(last)?.0))
 }
 
 /// Returns a level as the game draws it; `None` if it draws none.

@@ -12,9 +12,10 @@ use playbot_report::{PlainTable, counted};
 use playbot_test::{
     detectors::{ALWAYS, DetectorChoice, DetectorError, DetectorInfo, Detectors, Pars, TIMING, forget_timing, list},
     findings::{
-        Checks, Date, FindingStatus, Regress, RegressRow, Regression, StoredFinding, list_findings, regress_until,
+        Checks, Date, FindingStatus, LOST, NOT_SOLVED, PinState, Pins, Regress, RegressRow, Regression, StoredFinding,
+        list_findings, regress_until,
     },
-    verdict::{LevelPars, maps::level_name},
+    verdict::{Finding, LevelPars, ResultLines, maps::level_name},
 };
 use std::{
     collections::BTreeSet,
@@ -143,22 +144,87 @@ fn report_all(regression: &Regression) {
     );
     for row in &regression.rows {
         match &row.pin {
-            Some(pin) if pin.expired => {
-                report!(
-                    "the pin of {} has expired on {} ({}): mend it, or pin it anew",
-                    row.finding,
-                    pin.until,
-                    pin.reason
-                );
-            }
+            Some(pin) if pin.expired => report!("{}", expired(&row.finding, pin)),
             Some(_) if row.status == FindingStatus::Gone => {
                 report!("the pin of {} is no longer needed, since it is gone", row.finding);
             }
             _ => {}
         }
     }
-    for name in &regression.unknown_pins {
-        report!("there is no finding {name}, though it is pinned: take the pin out, or correct its name");
+    regression.unknown_pins.iter().for_each(|name| report!("{}", unknown(name)));
+}
+
+/// Describes a pin that has expired.
+fn expired(name: &str, pin: &PinState) -> String {
+    format!("the pin of {name} has expired on {} ({}): mend it, or pin it anew", pin.until, pin.reason)
+}
+
+/// Describes a pin without a finding.
+fn unknown(name: &str) -> String {
+    format!("there is no finding {name}, though it is pinned: take the pin out, or correct its name")
+}
+
+// Pins in a test.
+
+/// The levels that do not count because all that is wrong with them is pinned.
+#[derive(Debug, Default, PartialEq)]
+pub(crate) struct PinnedLevels {
+    /// Their number.
+    pub excused: u64,
+    /// What is to be said of the pins.
+    pub words: Vec<String>,
+}
+
+impl PinnedLevels {
+    /// Finds them in the results of a folder, by its pins.
+    ///
+    /// # Errors
+    ///
+    /// The results or the pins cannot be read.
+    pub fn of(folder: &Path) -> Result<Self, CliError> {
+        let (pins, today) = (Pins::read(folder)?, Date::today());
+        if pins.is_empty() {
+            return Ok(Self::default());
+        }
+        let files = list_findings(folder).unwrap_or_default();
+        let mut words = Vec::new();
+        let mut holds = BTreeSet::new();
+        for (name, _) in &files {
+            match pins.of(name, today) {
+                Some(pin) if pin.expired => words.push(expired(name, &pin)),
+                Some(_) => drop(holds.insert(name.as_str())),
+                None => {}
+            }
+        }
+        // Failed episodes are kept for levels without findings.
+        let failed = files.iter().filter(|(name, _)| holds.contains(name.as_str()));
+        let failed = failed.filter_map(|(_, path)| StoredFinding::read(path).ok());
+        let failed: BTreeSet<String> = failed
+            .filter(|finding| [LOST, NOT_SOLVED].contains(&finding.head.detector.as_str()))
+            .map(|finding| finding.head.level)
+            .collect();
+        let is_pinned = |finding: &Finding| {
+            let name = finding.file.as_ref().and_then(|file| Path::new(file).file_stem()?.to_str());
+            name.is_some_and(|name| holds.contains(name))
+        };
+        let (mut excused, mut lines) = (0, ResultLines::open(folder)?);
+        while let Some(level) = lines.next_level()? {
+            let is_excused = match level.findings.as_slice() {
+                [] => failed.contains(&level.level),
+                findings => findings.iter().all(is_pinned),
+            };
+            excused += u64::from(!level.is_sound() && !level.is_regression() && is_excused);
+        }
+        if !holds.is_empty() {
+            let findings = counted(holds.len() as u64, "pinned finding");
+            words.push(format!("{findings}; levels with nothing else wrong, which do not count: {excused}"));
+        }
+        // A shard has only some of the findings.
+        if lines.record().shard.is_none() {
+            let names: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
+            words.extend(pins.unknown(&names).iter().map(|name| unknown(name)));
+        }
+        Ok(Self { excused, words })
     }
 }
 

@@ -4,19 +4,22 @@ use crate::{
     error::{CliError, Outcome},
     output,
     output::{print_line, print_table, program},
-    verbs::test::scenes::SceneMaker,
+    progress,
+    progress::interrupt,
+    verbs::test::{regress::PinnedLevels, scenes::SceneMaker},
 };
 use playbot_harness::{brief::shell_word, game::Game};
 use playbot_report::{PlainTable, counted, ticks, whole};
 use playbot_test::{
-    findings::{FINDINGS, list_findings},
+    findings::{FINDINGS, Pins, list_findings},
     verdict::{
         AGAINST, Comparison, JUNIT, LevelVerdict, MOST_WORST, Overview, RESULTS, RecordedTotal, ResultLines, SUMMARY,
-        TesterTotal, Trials, action_search, comparable_command, missing_failure, report_date, wilson, write_reports,
+        TestError, TesterTotal, Trials, action_search, comparable_command, missing_failure, report_date, wilson,
+        write_reports,
     },
-    verdict_report::{HtmlReport, REPORT, write_html},
+    verdict_report::{HtmlReport, LevelExplorer, REPORT, folder_of, write_html},
 };
-use std::{fs, path::Path};
+use std::{cell::OnceCell, fs, path::Path};
 
 /// Most findings whose replay command is printed.
 const MOST_REPLAYS: usize = 3;
@@ -36,6 +39,10 @@ pub struct Results<'a> {
     pub json: bool,
     /// A failed episode of each level without a solution was to be kept.
     pub keeps_failures: bool,
+    /// The page has its pictures in files beside it.
+    pub split: bool,
+    /// Threads of the explorer of unsolvable levels.
+    pub threads: usize,
 }
 
 impl Results<'_> {
@@ -43,9 +50,11 @@ impl Results<'_> {
     ///
     /// # Errors
     ///
-    /// Both folders are the same, or reports are to have a date that is none.
+    /// Both folders are the same, reports are to have a date that is none, or the pins cannot be read.
     pub fn check(&self) -> Result<(), CliError> {
         report_date()?;
+        // A mistake in them is to be known before the test.
+        Pins::read(self.folder)?;
         let is_same = |before: &Path| match (fs::canonicalize(before), fs::canonicalize(self.folder)) {
             (Ok(before), Ok(folder)) => before == folder,
             _ => before == self.folder,
@@ -70,13 +79,9 @@ pub fn report_results(results: &Results) -> Result<Outcome, CliError> {
         program::name()
     );
     let not_written = |error| output::with_advice(error, &next);
+    let pinned = PinnedLevels::of(results.folder)?;
     let overview = write_reports(results.folder, comparison.as_ref(), program::name()).map_err(not_written)?;
-    let maker = results.game.map(SceneMaker::new);
-    let scene = |file: &Path| maker.as_ref()?.scene(file);
-    let (game, program) = (results.game, program::name());
-    let report = HtmlReport { game, comparison: comparison.as_ref(), program, scenes: Some(&scene) };
-    write_html(results.folder, &results.folder.join(REPORT), &report).map_err(not_written)?;
-    drop(maker);
+    write_page(results, comparison.as_ref(), &results.folder.join(REPORT)).map_err(not_written)?;
     if results.json {
         let mut lines = ResultLines::open(results.folder)?;
         while let Some(line) = lines.next_line()? {
@@ -105,16 +110,44 @@ pub fn report_results(results: &Results) -> Result<Outcome, CliError> {
         report_comparison(comparison, &overview);
     }
     report_recording(&overview.recorded);
+    pinned.words.iter().for_each(|words| report!("{words}"));
     let names = [RESULTS, REPORT, JUNIT, SUMMARY].into_iter().chain(comparison.as_ref().map(|_| AGAINST));
-    report!("{folder}: {}", names.collect::<Vec<_>>().join(", "));
+    let pictures = Some(folder_of(Path::new(REPORT))).filter(|name| results.folder.join(name).is_dir());
+    let pictures = pictures.map(|name| name.display().to_string());
+    let names: Vec<&str> = names.chain(pictures.as_deref()).collect();
+    report!("{folder}: {}", names.join(", "));
     if results.keeps_failures && overview.bot_failed == 0 {
         report!("no failed episode is kept: each level was solved, or is proved unsolvable");
     }
     let is_sound = match &comparison {
         Some(comparison) => !comparison.has_alarms() && overview.recorded.regressions.is_empty(),
-        None => overview.is_sound(),
+        None => overview.unsound <= pinned.excused,
     };
     Ok(if is_sound { Outcome::Pass } else { Outcome::Findings })
+}
+
+/// Writes the page of results into a file, with progress bars for what takes long.
+///
+/// # Errors
+///
+/// The results are damaged, or a file cannot be written.
+pub(crate) fn write_page(results: &Results, comparison: Option<&Comparison>, file: &Path) -> Result<(), TestError> {
+    let maker = results.game.map(SceneMaker::new);
+    let scene = |file: &Path| maker.as_ref()?.scene(file);
+    let bar = OnceCell::new();
+    let each = || bar.get_or_init(|| progress::bar("explore unsolvable levels", 0, "levels")).inc(1);
+    let report = HtmlReport {
+        game: results.game,
+        comparison,
+        before: results.against,
+        program: program::name(),
+        scenes: Some(&scene),
+        explorer: Some(LevelExplorer { threads: results.threads, each: &each, stop: &interrupt::asked }),
+        split: results.split,
+    };
+    let written = write_html(results.folder, file, &report);
+    bar.get().iter().for_each(|bar| bar.finish_and_clear());
+    written
 }
 
 /// Returns the reason why no squares were counted, if it is that the game draws no floor plans.
@@ -158,6 +191,10 @@ fn replays(folder: &Path, overview: &Overview) -> Vec<String> {
         _ if more > 0 => lines.push(format!("and {more} more in {}", folder.join(FINDINGS).display())),
         _ => {}
     }
+    if !lines.is_empty() {
+        let folder = shell_word(&folder.display().to_string());
+        lines.push(format!("decide on them one by one: {} review {folder}", program::name()));
+    }
     lines
 }
 
@@ -169,7 +206,7 @@ fn missing(overview: &Overview) -> Vec<String> {
 
 /// Returns the command that shows a finding.
 fn seen_with(file: &Path) -> String {
-    format!("see it: {} replay {}", program::name(), shell_word(&file.display().to_string()))
+    format!("see it: {} replay {} --apng finding.png", program::name(), shell_word(&file.display().to_string()))
 }
 
 fn counts(overview: &Overview) -> String {

@@ -39,15 +39,17 @@ pub(super) struct LevelFiles {
 }
 
 impl LevelFiles {
-    /// Names the files of a range, and checks that there are some.
+    /// Names the files of a range. There may be none yet.
     ///
     /// # Errors
     ///
-    /// The pattern is not valid, or matches no file.
+    /// The pattern is not valid, or names folders alone.
     pub fn new(split: &LevelSplit) -> Result<Self, CliError> {
         let pattern = level_file_pattern(&split.mode).unwrap_or(&split.mode).to_owned();
-        find_level_files(&pattern).map_err(|error| CliError::Usage(error.to_string()))?;
-        Ok(Self { pattern })
+        match find_level_files(&pattern) {
+            Ok(_) | Err(LevelFileError::NoFiles { .. }) => Ok(Self { pattern }),
+            Err(error) => Err(CliError::Usage(error.to_string())),
+        }
     }
 
     /// Returns all files with their stamps, and what keeps them from being found.
@@ -123,8 +125,11 @@ mod tests {
         let levels = folder.path().join("levels");
         fs::create_dir(&levels).expect("writable");
         fs::write(levels.join("a.json"), "{}").expect("writable");
-        let mode = format!("files:{}/*.json", levels.display());
-        let files = LevelFiles::new(&LevelSplit::one(mode, 0)).expect("one file");
+        let mode = |pattern: &str| LevelSplit::one(format!("files:{}/{pattern}", folder.path().display()), 0);
+        let files = LevelFiles::new(&mode("levels/*.json")).expect("one file");
+        assert!(LevelFiles::new(&mode("later/*.json")).is_ok_and(|files| files.look().1.is_some()), "it may come");
+        let refused = LevelFiles::new(&mode("levels")).err().map(|error| error.to_string());
+        assert!(refused.is_some_and(|words| words.contains("is a folder: name the files in it")));
         assert_eq!(files.look().0.len(), 1);
         fs::remove_dir_all(&levels).expect("it is there");
         let (found, problem) = files.look();

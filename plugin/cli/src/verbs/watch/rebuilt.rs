@@ -261,12 +261,12 @@ mod tests {
 
     #[test]
     #[cfg(unix)]
-    fn a_build_that_fails_is_told_with_its_last_words() {
+    fn a_build_that_fails_is_reported_with_its_last_words() {
         let sources = |command: &str| Sources { code: vec![], assets: vec![], rebuild: Some(command.to_owned()) };
         assert_eq!(sources("true").rebuild(true, &|| false), None);
         assert_eq!(sources("false").rebuild(false, &|| false), None);
-        let told = sources("echo 'error: no such thing' >&2; exit 1").rebuild(true, &|| false).expect("it failed");
-        assert!(told.contains("failed") && told.ends_with("error: no such thing"), "{told}");
-        assert!(sources("exec sleep 60").rebuild(true, &|| true).is_some_and(|told| told.contains("was stopped")));
+        let words = sources("echo 'error: no such thing' >&2; exit 1").rebuild(true, &|| false).expect("it failed");
+        assert!(words.contains("failed") && words.ends_with("error: no such thing"), "{words}");
+        assert!(sources("exec sleep 60").rebuild(true, &|| true).is_some_and(|words| words.contains("was stopped")));
     }
 }

@@ -118,12 +118,12 @@ impl fmt::Display for LevelState {
         if let Some(problem) = problem {
             return write!(f, "{level}: NOT TESTED: {problem}");
         }
-        let by = verdict.solved_by.as_deref().unwrap_or("nobody");
         match (verdict.outcome, verdict.ticks) {
-            (Some(LevelOutcome::Solved), Some(count)) => {
-                write!(f, "{level}: solved in {} by {by}", counted(count.into(), "tick"))?
+            (Some(LevelOutcome::Solved), count) => {
+                write!(f, "{level}: solved")?;
+                count.iter().try_for_each(|count| write!(f, " in {}", counted(u64::from(*count), "tick")))?;
+                verdict.solved_by.iter().try_for_each(|tester| write!(f, " by {tester}"))?;
             }
-            (Some(LevelOutcome::Solved), None) => write!(f, "{level}: solved")?,
             (Some(outcome), _) => write!(f, "{level}: {}", in_words(outcome).to_uppercase())?,
             (None, _) => write!(f, "{level}: not known")?,
         }
@@ -150,7 +150,7 @@ impl fmt::Display for LevelState {
         if verdict.lost > 0 {
             write!(f, "; {}", counted(verdict.lost, "death"))?;
         }
-        // A proof that there is no way is a finding, too, and is told already.
+        // A proof that there is no path is a finding, too, and is printed above.
         for finding in verdict.findings.iter().filter(|finding| verdict.why.as_ref() != Some(&finding.message)) {
             write!(f, "; {}: {}", finding.detector, finding.message)?;
         }
@@ -337,7 +337,7 @@ mod tests {
         assert!(again.levels().is_empty() && folder.path().join(DAMAGED).is_file());
         drop(again);
         let (last, message) = Saves::open(folder.path(), false).expect("readable");
-        assert_eq!((last.all().len(), message), (3, None), "it is told once");
+        assert_eq!((last.all().len(), message), (3, None), "it is reported once");
     }
 
     #[test]

@@ -23,7 +23,7 @@
     if (state.verdict.findings.length > 0 && state.verdict.outcome === "solved") return "bot-failed";
     return state.verdict.outcome;
   };
-  // Returns the level of a save that somebody should look at first.
+  // Returns the level of a save with the worst outcome.
   const worst = (save) => [...(save?.levels ?? [])].sort((a, b) => rank[kind(a)] - rank[kind(b)])[0];
   const rank = { broken: 0, "proved-unsolvable": 1, "bot-failed": 2, testing: 3, solved: 4 };
   const outcomes = { solved: "solved", "bot-failed": "not solved, nothing proved", "proved-unsolvable": "unsolvable" };
@@ -159,14 +159,14 @@
     for (const entry of get("legend").children) {
       entry.hidden = !(state.verdict.picture ?? "").includes(entry.dataset.of);
     }
-    // A proof that there is no way is a finding, too, and is told already.
+    // A proof that there is no path is a finding, too, and is shown above.
     const findings = state.verdict.findings.filter((finding) => finding.message !== state.verdict.why);
     get("findings").replaceChildren(...findings.map((finding) => {
       const entry = document.createElement("li");
       const name = document.createElement("b");
       name.textContent = finding.detector;
-      const who = finding.tester ? ` (${finding.tester}${finding.tick === null ? "" : `, tick ${finding.tick}`})` : "";
-      entry.append(name, `${who}: ${finding.message}`);
+      const by = finding.tester ? ` (${finding.tester}${finding.tick === null ? "" : `, tick ${finding.tick}`})` : "";
+      entry.append(name, `${by}: ${finding.message}`);
       return entry;
     }));
     get("took").textContent = state.problem ? "" : `Tested in ${state.seconds.toFixed(2)} s.`;

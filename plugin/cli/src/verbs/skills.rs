@@ -1,0 +1,274 @@
+//! `playbot skills`: one state of a level, and what the policy does from there with each skill.
+//!
+//! - `rollouts`: the state, and the rollout of a skill from it.
+//! - `page`: the page, its server on this machine, and the same page as a file.
+//! - `names`: names of regions of skills, in a file beside the policy.
+
+pub(crate) mod names;
+mod page;
+mod rollouts;
+
+use crate::{
+    arguments::{LevelsArg, check_start, default_mode, player::PlayerArgs},
+    error::{CliError, Outcome},
+    output,
+    output::print_line,
+    progress,
+    progress::interrupt,
+    verbs::skills::{
+        names::SkillNames,
+        page::{Ask, Page},
+        rollouts::{Rollout, Rollouts},
+    },
+};
+use bevy_playbot::vision::{ObservationConfig, ObservationKind};
+use playbot_harness::{eval::Player, game::Game, games::Games, sensors::GameSensors};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// The usual port of the page.
+const PORT: u16 = 8138;
+
+/// Skills of a row of the grid.
+const SIDE: usize = 5;
+
+/// Largest value of the grid's two dimensions: skills are between -1 and 1, or mostly so without tanh.
+const REACH: f32 = 0.9;
+
+/// See what each skill does from one state: a page with a rollout for each point of a grid, and sliders for z.
+///
+/// The policy plays the level up to --tick. From there each tile shows what it does with one skill for --ticks ticks. A
+/// region of skills can be given a name on the page, which `view`, `play` and this verb then show.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot skills GAME --run runs/first --level 7
+  playbot skills GAME --policy my.policy --level 7 --tick 40 --ticks 30
+  playbot skills GAME --run runs/first --out skills.html   the same as one file, without sliders
+  playbot skills GAME --run runs/first --json   one line for each tile")]
+pub struct Args {
+    /// Name of the game.
+    game: String,
+    /// Mode of the game (default: the one that it is trained in).
+    #[arg(long)]
+    mode: Option<String>,
+    #[command(flatten)]
+    levels: LevelsArg,
+    /// Random seed of the policy's draws (default: 0).
+    #[arg(long)]
+    seed: Option<u64>,
+    #[command(flatten)]
+    player: PlayerArgs,
+    /// Tick of the episode, from 0, at which the skills begin.
+    #[arg(long, default_value_t = 0)]
+    tick: u32,
+    /// Ticks for which a skill is followed (default: those of the policy, at least 20).
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=2000))]
+    ticks: Option<u32>,
+    /// The two values of z that the grid varies, counted from 0.
+    #[arg(long, value_name = "X,Y", value_delimiter = ',', num_args = 2, default_values_t = [0, 1])]
+    dims: Vec<usize>,
+    /// Skills drawn from the prior at this state, in place of the grid.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100))]
+    draw: Option<u32>,
+    /// File of the names (default: skill-names.json in the folder of the run, or beside the policy).
+    #[arg(long, value_name = "FILE")]
+    names: Option<PathBuf>,
+    /// Enlargement of the pictures.
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=16))]
+    scale: u32,
+    /// Write the page into this file, and do not serve it.
+    #[arg(long, value_name = "FILE", value_parser = output::html, conflicts_with = "port")]
+    out: Option<PathBuf>,
+    /// Port of the page; 0 takes any.
+    #[arg(long)]
+    port: Option<u16>,
+    /// Print one line of JSON per tile: z, return, end and name. Nothing is served.
+    #[arg(long, conflicts_with_all = ["port", "out"])]
+    json: bool,
+}
+
+pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    let game = games.get(&args.game)?;
+    let (mode, level) = args.levels.choose(game, args.mode.as_deref(), args.seed)?;
+    let mode = mode.unwrap_or_else(|| default_mode(game)).to_owned();
+    game.check_mode(&mode)?;
+    check_start(game, &mode, level)?;
+    let Some(chosen) = args.player.load(game)? else {
+        return Err(CliError::Usage("no policy is named: add --run or --policy".to_owned()));
+    };
+    let Player::Policy { prior: Some(prior), .. } = &chosen.player else {
+        return Err(CliError::Usage(format!(
+            "{} follows no skills: name a run or a policy of score-ppo, score-sac, spirl-ppo or spirl-sac",
+            chosen.name
+        )));
+    };
+    let latent = prior.prior.latent();
+    if let Some(dim) = args.dims.iter().find(|dim| **dim >= latent) {
+        return Err(CliError::Usage(format!("--dims {dim}: z has {latent} values, counted from 0")));
+    }
+    let (ticks, interval) = (args.ticks.unwrap_or(prior.skill_interval.max(20)), prior.skill_interval);
+    let names_file =
+        args.names.clone().or_else(|| args.player.names_file()).unwrap_or_else(|| "skill-names.json".into());
+    let names = SkillNames::read(&names_file)?;
+    let observation_config = observation_config(game, &chosen.observation_config)?;
+    interrupt::listen();
+    let mut rollouts = Rollouts {
+        game,
+        mode: &mode,
+        level,
+        seed: args.levels.random_seed(args.seed),
+        player: &chosen.player,
+        observation_config,
+        tick: args.tick,
+        ticks,
+        scale: args.scale,
+    };
+    let skills = match args.draw {
+        Some(count) => rollouts.draws(count as usize)?,
+        None => grid(latent, [args.dims[0], args.dims[1]]),
+    };
+    let about = json!({
+        "game": game.name(), "mode": mode, "level": level, "tick": args.tick, "ticks": ticks, "interval": interval,
+        "latent": latent, "dims": args.dims, "policy": chosen.name, "columns": columns(skills.len()),
+    });
+    if args.json {
+        return as_json(&mut rollouts, &skills, &names);
+    }
+    if let Some(path) = &args.out {
+        return as_file(path, about, &mut rollouts, &skills, &names);
+    }
+    serve(&args, about, rollouts, skills, names, names_file)
+}
+
+/// Returns the observation that the policy reads, or the game's picture if that is numbers.
+fn observation_config(game: &dyn Game, own: &ObservationConfig) -> Result<ObservationConfig, CliError> {
+    if own.is_image() {
+        return Ok(*own);
+    }
+    let kind = match game.tools().pictures.picture() {
+        Some(_) => ObservationKind::Raster,
+        None => ObservationKind::Vector,
+    };
+    let observation_config = ObservationConfig { kind, ..*own };
+    observation_config.check(game)?;
+    Ok(observation_config)
+}
+
+/// Returns the skills of the grid, row by row: the second dimension falls from row to row. The others are 0.
+fn grid(latent: usize, [across, down]: [usize; 2]) -> Vec<Vec<f32>> {
+    let value = |index: usize| REACH * (2.0 * index as f32 / (SIDE - 1) as f32 - 1.0);
+    let mut skills = Vec::new();
+    for row in (0..SIDE).rev() {
+        for column in 0..SIDE {
+            let mut z = vec![0.0; latent];
+            z[down] = value(row);
+            z[across] = value(column);
+            skills.push(z);
+        }
+    }
+    // One dimension makes one row.
+    if across == down {
+        skills.truncate(SIDE);
+        for (index, z) in skills.iter_mut().enumerate() {
+            z[across] = value(index);
+        }
+    }
+    skills
+}
+
+fn columns(count: usize) -> usize {
+    SIDE.min(count.max(1))
+}
+
+/// Rolls out all skills, with a bar.
+fn roll_out(
+    rollouts: &mut Rollouts<'_>,
+    skills: &[Vec<f32>],
+    names: &SkillNames,
+) -> Result<Option<Vec<Rollout>>, CliError> {
+    let bar = progress::bar("roll out", skills.len() as u64, "skills");
+    let mut tiles = Vec::new();
+    for z in skills {
+        if interrupt::asked() {
+            bar.finish_and_clear();
+            return Ok(None);
+        }
+        tiles.push(rollouts.of(z, names)?);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(Some(tiles))
+}
+
+fn as_json(rollouts: &mut Rollouts<'_>, skills: &[Vec<f32>], names: &SkillNames) -> Result<Outcome, CliError> {
+    for z in skills {
+        if interrupt::asked() {
+            return Ok(Outcome::Stopped);
+        }
+        let rollout = rollouts.of(z, names)?;
+        print_line(rollout.as_json(z, names))?;
+    }
+    Ok(Outcome::Pass)
+}
+
+fn as_file(
+    path: &std::path::Path,
+    about: serde_json::Value,
+    rollouts: &mut Rollouts<'_>,
+    skills: &[Vec<f32>],
+    names: &SkillNames,
+) -> Result<Outcome, CliError> {
+    output::prepare(path)?;
+    let Some(tiles) = roll_out(rollouts, skills, names)? else {
+        report!("stopped; nothing is written");
+        return Ok(Outcome::Stopped);
+    };
+    output::write(path, page::as_file(&about, skills, &tiles, names).as_bytes())?;
+    report!("{} skills from tick {} written to {}", tiles.len(), rollouts.tick, path.display());
+    Ok(Outcome::Pass)
+}
+
+/// Serves the page until Ctrl-C.
+fn serve(
+    args: &Args,
+    about: serde_json::Value,
+    mut rollouts: Rollouts<'_>,
+    skills: Vec<Vec<f32>>,
+    mut names: SkillNames,
+    names_file: PathBuf,
+) -> Result<Outcome, CliError> {
+    // The first tile now: an error of the game is one of this command, not of its page.
+    if let Some(first) = skills.first() {
+        rollouts.of(first, &names)?;
+    }
+    let page = Page::open(args.port, PORT)?;
+    let place = if page.is_other() { "the port is taken, so the page" } else { "the page" };
+    report!("{place} is at {}; Ctrl-C ends it", page.address());
+    while !interrupt::asked() {
+        let Some((ask, answer)) = page.next() else { continue };
+        match ask {
+            Ask::About => answer.json(&json!({ "about": about, "skills": skills, "names": names.regions })),
+            Ask::Tile(z) if z.len() == rollouts.latent() && z.iter().all(|value| value.is_finite()) => {
+                match rollouts.of(&z, &names) {
+                    Ok(rollout) => answer.json(&rollout.with_picture(&z, &names)),
+                    Err(error) => answer.failed(&error.to_string()),
+                }
+            }
+            Ask::Tile(_) => answer.failed("z has other values than the policy's skills"),
+            Ask::Name(region) => {
+                let changed = names.with(region);
+                match changed.write(&names_file) {
+                    Ok(()) => {
+                        names = changed;
+                        answer.json(&json!({ "names": names.regions }));
+                    }
+                    Err(error) => answer.failed(&error.to_string()),
+                }
+            }
+        }
+    }
+    if !names.regions.is_empty() {
+        report!("names are in {}", names_file.display());
+    }
+    Ok(Outcome::Stopped)
+}
