@@ -65,8 +65,8 @@ pub struct Args {
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=2000))]
     ticks: Option<u32>,
     /// The two values of z that the grid varies, counted from 0.
-    #[arg(long, value_name = "X,Y", value_delimiter = ',', num_args = 2, default_values_t = [0, 1])]
-    dims: Vec<usize>,
+    #[arg(long, value_name = "X,Y", default_value = "0,1", value_parser = two_dims)]
+    dims: [usize; 2],
     /// Skills drawn from the prior at this state, in place of the grid.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100))]
     draw: Option<u32>,
@@ -125,7 +125,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     };
     let skills = match args.draw {
         Some(count) => rollouts.draws(count as usize)?,
-        None => grid(latent, [args.dims[0], args.dims[1]]),
+        None => grid(latent, args.dims),
     };
     let about = json!({
         "game": game.name(), "mode": mode, "level": level, "tick": args.tick, "ticks": ticks, "interval": interval,
@@ -138,6 +138,12 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         return as_file(path, about, &mut rollouts, &skills, &names);
     }
     serve(&args, about, rollouts, skills, names, names_file)
+}
+
+/// Parses two numbers with a comma between them.
+fn two_dims(text: &str) -> Result<[usize; 2], String> {
+    let numbers = text.split_once(',').and_then(|(x, y)| Some([x.trim().parse().ok()?, y.trim().parse().ok()?]));
+    numbers.ok_or_else(|| "they must be two numbers of values of z, such as 0,1".to_owned())
 }
 
 /// Returns the observation that the policy reads, or the game's picture if that is numbers.
