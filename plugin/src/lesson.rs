@@ -6,17 +6,13 @@
 //! soon as its input ends, so that it never outlives the game, however the game ends.
 //!
 //! ```no_run
-//! use bevy_playbot::lesson::{Lesson, LessonNews};
+//! use bevy_playbot::lesson::{Lesson, LessonNews, lesson_command};
 //! use std::process::Command;
 //!
-//! let mut command = Command::new("target/release/bots");
-//! command.args(["teach", "walk", "--demos", "walk.demo", "--out", "lessons", "--json", "--until-input-ends"]);
-//! let mut lesson = Lesson::begin(command)?;
+//! let mut lesson = Lesson::begin(lesson_command(Command::new("target/release/bots"), "walk", "walk.demo".as_ref()))?;
 //! // In each frame:
-//! for news in lesson.news() {
-//!     if let LessonNews::Policy { file, .. } = news {
-//!         println!("{} plays better than what was there before", file.display());
-//!     }
+//! if let Some(LessonNews::Policy { file, .. }) = LessonNews::newest_policy(&lesson.news()) {
+//!     println!("{} plays better than what was there before", file.display());
 //! }
 //! # Ok::<(), bevy_playbot::lesson::LessonError>(())
 //! ```
@@ -26,14 +22,14 @@ use serde::{Deserialize, Serialize};
 use std::{
     fmt, io,
     io::{BufRead, BufReader},
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::{Child, ChildStdin, Command, Stdio},
     sync::{
         Mutex, PoisonError,
         mpsc::{Receiver, RecvTimeoutError, Sender, channel},
     },
     thread,
-    time::Duration,
+    time::{Duration, Instant},
 };
 use thiserror::Error;
 
@@ -75,6 +71,23 @@ pub enum LessonNews {
         /// The reason.
         why: String,
     },
+}
+
+impl LessonNews {
+    /// Returns the last policy among the news, as it stands there.
+    pub fn newest_policy(news: &[Self]) -> Option<&Self> {
+        news.iter().rev().find(|one| matches!(one, Self::Policy { .. }))
+    }
+}
+
+/// Completes the command of a lesson on a recording of a game: `program` with its first arguments. The lesson keeps what it
+/// has learned beside the recording, in a folder of the same name with the ending `lessons`. It leaves one core to the game.
+pub fn lesson_command(mut program: Command, game: &str, recording: &Path) -> Command {
+    program.args(["teach", game, "--json", "--until-input-ends", "--demos"]).arg(recording);
+    program.arg("--out").arg(recording.with_extension("lessons"));
+    let threads = thread::available_parallelism().map_or(1, |cores| cores.get().saturating_sub(1).max(1));
+    program.arg("--threads").arg(threads.to_string());
+    program
 }
 
 /// A stage of a lesson.
@@ -221,8 +234,9 @@ impl Drop for Lesson {
     fn drop(&mut self) {
         self.stop();
         let heard = self.heard.get_mut().unwrap_or_else(PoisonError::into_inner);
+        let end = Instant::now() + PATIENCE;
         // The program is gone when nothing can be heard of it any more.
-        while heard.recv_timeout(PATIENCE).is_ok() {}
+        while heard.recv_timeout(end.saturating_duration_since(Instant::now())).is_ok() {}
         // Frees the entry of a program that has ended. One that has not ends without us.
         let _ = self.child.try_wait();
     }
@@ -231,8 +245,12 @@ impl Drop for Lesson {
 /// Hears each line on a thread of its own, until there are no more.
 fn listen(from: impl io::Read + Send + 'static, send: Sender<Heard>) {
     thread::spawn(move || {
-        // A line that is no text is of no use.
-        for line in BufReader::new(from).lines().map_while(Result::ok).filter(|line| !line.trim().is_empty()) {
+        for line in BufReader::new(from).split(b'\n').map_while(Result::ok) {
+            // Words in another encoding are still words.
+            let line = String::from_utf8_lossy(&line).into_owned();
+            if line.trim().is_empty() {
+                continue;
+            }
             let heard = serde_json::from_str(&line).map_or_else(|_| Heard::Line(line), Heard::News);
             if send.send(heard).is_err() {
                 return;

@@ -387,10 +387,13 @@ pub struct GameIdentity {
     pub mode: String,
 }
 
+/// The mode of a game that has only one.
+const DEFAULT_MODE: &str = "default";
+
 impl GameIdentity {
     /// Creates a game in its only mode.
     pub fn new(name: &str, version: u32) -> Self {
-        Self { name: name.to_owned(), version, mode: "default".to_owned() }
+        Self { name: name.to_owned(), version, mode: DEFAULT_MODE.to_owned() }
     }
 
     /// Returns the same game in another mode.

@@ -165,8 +165,7 @@ pub(super) fn start_recording(world: &mut World, path: &Path) -> Result<(), Take
         demonstrator: std::env::var("PLAYBOT_NAME").unwrap_or_else(|_| SOMEBODY.to_owned()),
         ..DemoHeader::new(&game.name, game.version, &game.mode, tick_hz(world), demo_actions(&actions))
     };
-    let writer = if path.exists() { DemoWriter::append(path, &header)? } else { DemoWriter::create(path, header)? };
-    world.insert_resource(Recorder::new(writer));
+    world.insert_resource(Recorder::new(DemoWriter::append_or_create(path, header)?));
     for agent in agents {
         // A file holds actions of one kind.
         if world.get::<Agent>(agent).is_some_and(|agent| agent.actions == actions) {
@@ -174,11 +173,6 @@ pub(super) fn start_recording(world: &mut World, path: &Path) -> Result<(), Take
         }
     }
     Ok(())
-}
-
-/// Writes what was played of the running episodes, for a lesson. They are recorded again from their next ones on.
-pub(super) fn flush_recording(world: &mut World) -> Result<(), TakeoverError> {
-    Ok(flush_unfinished(world)?)
 }
 
 /// Ends the recording. Unfinished episodes are kept as aborted.

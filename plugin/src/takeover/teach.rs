@@ -2,9 +2,10 @@
 //! learned so far.
 
 use crate::{
+    demo::recorder::flush_unfinished,
     fault::Faults,
-    lesson::{Lesson, LessonNews},
-    takeover::{GameIdentity, Takeover, TakeoverRequest, play},
+    lesson::{Lesson, LessonNews, lesson_command},
+    takeover::{DEFAULT_MODE, GameIdentity, Takeover, TakeoverRequest, play},
 };
 use bevy::prelude::*;
 use std::{
@@ -27,11 +28,18 @@ pub struct TeachOptions {
 }
 
 impl Default for TeachOptions {
-    /// F10 and Tab, and the program of the environment variable `PLAYBOT_TEACH`, whose words are separated by blanks.
+    /// F10 and Tab, and the program of the environment variable `PLAYBOT_TEACH`: a path, or words separated by blanks.
     fn default() -> Self {
-        let program = std::env::var(VARIABLE).unwrap_or_default();
-        let program = program.split_whitespace().map(str::to_owned).collect();
+        let program = words(&std::env::var(VARIABLE).unwrap_or_default());
         Self { program, learn_key: Some(KeyCode::F10), hand_over_key: Some(KeyCode::Tab) }
+    }
+}
+
+/// Returns a program and its first arguments. The path of a file is one word, blanks and all.
+fn words(command: &str) -> Vec<String> {
+    match Path::new(command).is_file() {
+        true => vec![command.to_owned()],
+        false => command.split_whitespace().map(str::to_owned).collect(),
     }
 }
 
@@ -101,19 +109,26 @@ fn toggle(world: &mut World) {
     };
     let (program, args) = (program.clone(), args.to_vec());
     let takeover = world.resource::<Takeover>();
-    let Some(recording) = takeover.recording.clone() else { return };
+    let Some(recording) = takeover.recording.clone() else {
+        let words =
+            "nothing is recorded while PLAYBOT names a policy or a recording to play: start the game without it";
+        return world.resource_mut::<Teaching>().say(words);
+    };
     if takeover.is_recording()
-        && let Err(error) = play::flush_recording(world)
+        && let Err(error) = flush_unfinished(world)
     {
         return world.resource_mut::<Faults>().report(error.to_string());
     }
     if !recording.exists() {
         return world.resource_mut::<Teaching>().say("nothing is recorded yet: F9 records");
     }
-    let game = world.resource::<GameIdentity>().name.clone();
+    let GameIdentity { name, mode, .. } = world.resource();
     let mut command = Command::new(program);
-    command.args(args).args(["teach", &game, "--json", "--until-input-ends", "--demos"]).arg(&recording);
-    command.arg("--out").arg(recording.with_extension("lessons"));
+    command.args(args);
+    let mut command = lesson_command(command, name, &recording);
+    if mode != DEFAULT_MODE {
+        command.arg("--set").arg(format!("train={mode}:0..63"));
+    }
     let begun = Lesson::begin(command);
     let mut teaching = world.resource_mut::<Teaching>();
     match begun {
@@ -146,18 +161,30 @@ fn hear(world: &mut World) {
     if let LessonNews::Failed { why } = last {
         tracing::error!("the lesson failed: {why}");
     }
-    let newest = news.iter().rev().find_map(|one| match one {
-        LessonNews::Policy { file, .. } => Some((file.clone(), one.to_string())),
-        _ => None,
-    });
-    let Some((file, words)) = newest else { return };
+    let Some(newest @ LessonNews::Policy { file, .. }) = LessonNews::newest_policy(&news) else { return };
     teaching.learned = Some(file.clone());
-    tracing::info!("{words}");
+    tracing::info!("{newest}");
     let takeover = world.resource::<Takeover>();
-    if takeover.is_running() && takeover.request == TakeoverRequest::Policy(file.clone()) {
-        let reloaded = play::reload(world, &file);
-        if let Err(error) = reloaded {
-            world.resource_mut::<Faults>().report(error.to_string());
-        }
+    if takeover.is_running()
+        && takeover.request == TakeoverRequest::Policy(file.clone())
+        && let Err(error) = play::reload(world, file)
+    {
+        world.resource_mut::<Faults>().report(error.to_string());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_program_is_a_path_or_words() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("my bots");
+        std::fs::write(&path, "").expect("writable");
+        let path = path.display().to_string();
+        assert_eq!(words(&path), std::slice::from_ref(&path));
+        assert_eq!(words("cargo run --"), ["cargo", "run", "--"]);
+        assert!(words("").is_empty());
     }
 }

@@ -69,10 +69,20 @@ pub struct UpdateReport {
     pub timing: Timing,
 }
 
+/// Returns whether so many episodes have ended that means over the last 100 are of 100. Before, short episodes weigh more.
+pub fn is_settled(episodes: u64) -> bool {
+    episodes >= RECENT as u64
+}
+
 impl UpdateReport {
+    /// Returns whether at least 100 episodes have ended.
+    pub fn is_settled(&self) -> bool {
+        is_settled(self.episodes)
+    }
+
     /// Returns whether at least 100 episodes have ended, and at least this share of the last 100 succeeded.
     pub fn mostly_succeeds(&self, share: f64) -> bool {
-        self.episodes >= RECENT as u64 && self.success_rate.is_some_and(|rate| rate >= share)
+        self.is_settled() && self.success_rate.is_some_and(|rate| rate >= share)
     }
 
     /// Returns all measurements by TensorBoard tag; the same numbers in every run with the same seed.

@@ -235,7 +235,23 @@ pub fn train(
     setup: &TrainingSetup<'_>,
     observer: &mut dyn RunObserver,
 ) -> Result<Trainer, PipelineError> {
-    let mut training = if run.exists() && !is_unstarted(run) {
+    let mut training = begin_or_resume(game, experiment, skills, run, setup, observer)?;
+    match training.drive(observer)? {
+        true => Ok(training.trainer),
+        false => Err(PipelineError::Stopped(run.into())),
+    }
+}
+
+/// Begins a run in a folder, or resumes the one that is there, as [`train`] does.
+pub(crate) fn begin_or_resume(
+    game: &dyn Game,
+    experiment: &Experiment,
+    skills: Option<(&Path, &SkillModel)>,
+    run: &Path,
+    setup: &TrainingSetup<'_>,
+    observer: &mut dyn RunObserver,
+) -> Result<Training, PipelineError> {
+    if run.exists() && !is_unstarted(run) {
         let opened = RunDir::open_to_write(run)?;
         let (steps, checkpoints) = (experiment.steps, experiment.checkpoints);
         let wanted = experiment.without_study();
@@ -243,20 +259,11 @@ pub fn train(
             let (wanted, saved) = (Box::new(wanted), Box::new(opened.experiment));
             return Err(PipelineError::OtherSettings { run: run.into(), wanted, saved });
         }
-        Training::resume(game, opened, &wanted, setup)?
-    } else {
-        let (skill_file, skills) = skills.unzip();
-        Training::begin(
-            game,
-            &NewRun { path: run, experiment, skills, skill_file, init_from: None, force: false },
-            setup,
-            observer,
-        )?
-    };
-    match training.drive(observer)? {
-        true => Ok(training.trainer),
-        false => Err(PipelineError::Stopped(run.into())),
+        return Ok(Training::resume(game, opened, &wanted, setup)?);
     }
+    let (skill_file, skills) = skills.unzip();
+    let new = NewRun { path: run, experiment, skills, skill_file, init_from: None, force: false };
+    Ok(Training::begin(game, &new, setup, observer)?)
 }
 
 /// Measures a player on the experiment's held-out levels, each equally often. `name` is the name in the summary.

@@ -4,6 +4,7 @@ use crate::{
     checkpoint::CheckpointChoice,
     error::{RunError, TrainError},
     experiment::{Experiment, LearnerKind},
+    metrics_log::UpdateReport,
     recordings::{Recorded, RecordingsError, read_rollouts},
     run_dir::{BegunFrom, OpenedRun, RunDir, RunInfo, check_new},
     run_observer::{RunEvent, RunObserver},
@@ -213,6 +214,20 @@ impl Training {
     ///
     /// Training or saving fails; the last checkpoint is kept.
     pub fn drive(&mut self, observer: &mut dyn RunObserver) -> Result<bool, TrainingError> {
+        self.drive_with(observer, &mut |_, _| Ok(()))
+    }
+
+    /// Trains as [`drive`](Self::drive) does, and calls `after` with the trainer and its report after each update, once it
+    /// is saved if it is to be.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`drive`](Self::drive), and the first of `after`, which ends the training.
+    pub fn drive_with<E: From<TrainingError>>(
+        &mut self,
+        observer: &mut dyn RunObserver,
+        after: &mut dyn FnMut(&Trainer, &UpdateReport) -> Result<(), E>,
+    ) -> Result<bool, E> {
         let Self { run, trainer } = self;
         trainer.report_panics_to(run.path());
         let (steps_per_update, every) =
@@ -227,12 +242,13 @@ impl Training {
         while !trainer.is_done() && !observer.stopped() {
             observer.observe(RunEvent::UpdateBegun { step: trainer.steps() });
             let report = trainer.update().map_err(|error| stopped_by(run, error))?;
-            run.log(&report, steps_per_update)?;
+            run.log(&report, steps_per_update).map_err(TrainingError::from)?;
             observer.observe(RunEvent::Updated { report: &report, steps_per_update });
             if report.update.is_multiple_of(every) {
                 save(run, trainer, observer)?;
                 saved = report.update;
             }
+            after(trainer, &report)?;
         }
         if trainer.updates() > saved {
             save(run, trainer, observer)?;

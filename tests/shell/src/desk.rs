@@ -184,10 +184,17 @@ impl Seat<'_> {
         self.title()
     }
 
-    /// Waits until the game has played a number of ticks; a busy machine takes longer than by the clock.
+    /// Waits until the game has played a number of ticks, of one episode or of several; a busy machine takes longer than by
+    /// the clock.
     pub fn pass_ticks(&mut self, ticks: u32) {
-        let until = self.tick() + ticks;
-        self.wait("ticks", |seat| seat.tick() >= until);
+        let (mut seen, mut passed) = (self.tick(), 0);
+        self.wait("ticks", |seat| {
+            let tick = seat.tick();
+            // A lower tick is of the next episode.
+            passed += if tick < seen { tick } else { tick - seen };
+            seen = tick;
+            passed >= ticks
+        });
     }
 
     /// Waits as long as a number of ticks takes, in a game that stands still.

@@ -7,6 +7,12 @@ use crate::{desk::Desk, game_program::GameProgram, shell::Shell};
 /// Ticks that the demonstrator plays of each level.
 const TICKS: u32 = 40;
 
+/// Returns whether a pixel has the colour of the overlay's words, of which rounding may take one.
+fn is_overlay_text(pixel: u32) -> bool {
+    let near = |channel: u32, value: u32| (pixel >> channel & 0xff).abs_diff(value) <= 1;
+    near(16, 237) && near(8, 240) && near(0, 245)
+}
+
 impl GameProgram {
     /// `play --record`, and `demo verify` of it without a display. A person and the demonstrator play in a window, on
     /// several levels in one World, and the same actions give the same bits elsewhere.
@@ -71,6 +77,13 @@ impl GameProgram {
         seat.tap("Tab");
         seat.read("the learned policy plays");
         seat.pass_ticks(10);
+        // The game is given none of the keys now, and the overlay hears its own.
+        let is_shown = || desk.pixels(200).into_iter().any(is_overlay_text);
+        seat.wait("overlay", |_| is_shown());
+        seat.tap("F8");
+        seat.wait("end of the overlay", |_| !is_shown());
+        seat.tap("F8");
+        seat.wait("overlay again", |_| is_shown());
         seat.tap("Tab");
         seat.read("you play");
         seat.tap("Escape");

@@ -247,8 +247,12 @@ fn what_was_learned_from_a_recording_takes_over_and_gives_back() {
         r#"{{"event":"policy","file":"{}","stage":"imitation","steps":0,"mean_return":null}}"#,
         learned.display()
     );
-    let script = format!("echo '{news}'; cat > /dev/null; echo '{{\"event\":\"stopped\"}}'");
-    let program = ["sh", "-c", &script].map(str::to_owned).to_vec();
+    let asked = folder.path().join("asked");
+    let script = format!(
+        "echo \"$*\" > '{}'; echo '{news}'; cat > /dev/null; echo '{{\"event\":\"stopped\"}}'",
+        asked.display()
+    );
+    let program = ["sh", "-c", &script, "sh"].map(str::to_owned).to_vec();
     let teach = TeachOptions { program, ..TeachOptions::default() };
     let (mut app, agent) = build(TakeoverPlugin { teach, ..plugin(Some(TakeoverRequest::Record(recording.clone()))) });
     let words = |app: &App| app.world().resource::<Teaching>().words().unwrap_or_default().to_owned();
@@ -262,6 +266,8 @@ fn what_was_learned_from_a_recording_takes_over_and_gives_back() {
         app.update();
     }
     assert_eq!(words(&app), "learned by imitation");
+    let asked = std::fs::read_to_string(&asked).expect("the program was asked");
+    assert!(asked.starts_with("teach corridor ") && asked.contains(" --set train=plain:0..63"), "{asked}");
     press(&mut app, KeyCode::Tab);
     frames(&mut app, 3);
     assert_eq!(app.world().get::<Control>(agent), Some(&Control::Policy));

@@ -10,8 +10,11 @@ use crate::{
     output::{make_folder, print_line, program},
     progress::{console::Console, interrupt},
 };
-use bevy_playbot::lesson::{LessonNews, LessonStage};
-use playbot_harness::games::Games;
+use bevy_playbot::{
+    demo::file::{DemoReader, find_demos},
+    lesson::{LessonNews, LessonStage},
+};
+use playbot_harness::{games::Games, split::LevelSplit};
 use playbot_train::{
     Experiment,
     lesson::{LEARNED, Learned, LessonPlan, OF_NUMBERS, SETTINGS, teach},
@@ -29,15 +32,17 @@ use std::{
 /// Learn from a recording of yours: a first policy within seconds, and better ones while you watch.
 ///
 /// Behaviour cloning comes first. SCORE-PPO on copies of the game goes on from it. The best policy so far is always in
-/// FOLDER/learned.policy, which `play --policy` and games load.
+/// FOLDER/learned.policy, which `play --policy` and games load. Other recordings or settings begin a lesson of their own,
+/// whose policy is in a folder of FOLDER until it returns as much as the best one.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot teach GAME --demos my.demo --out lessons
   playbot play GAME --policy lessons/learned.policy
   playbot teach GAME --demos my.demo --out lessons --steps 500000 --json
 
-A game without an experiment of its own gets settings that suit short recordings; --set changes them. The same command
-goes on where it was stopped. In the window of `play`, F10 runs this verb.")]
+A game without an experiment of its own gets settings that suit short recordings; --set changes them. Recordings of another
+mode than the experiment's train on the recorded levels, at most 64. The same command
+goes on where it was stopped, with more --steps too. In the window of `play`, F10 runs this verb.")]
 pub struct Args {
     #[command(flatten)]
     from: ExperimentArgs,
@@ -78,8 +83,11 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let plan = LessonPlan { game, experiment: &experiment, recordings: &args.demos, folder: &args.out, setup: &setup };
     let printer = Printer { as_json: args.json, failed: RefCell::new(None) };
     let mut reporter = Reporter::new(&printer);
+    // The last policy, and whether it is the best of all lessons.
+    let mut last = None;
     let is_done = teach(&plan, &mut reporter, &mut |learned| {
-        let Learned { file, stage, steps, mean_return } = learned;
+        let Learned { file, is_best, stage, steps, mean_return } = learned;
+        last = Some((file.to_owned(), is_best));
         let news = LessonNews::Policy { file: file.to_owned(), stage, steps, mean_return };
         match printer.as_json {
             true => printer.print(&news),
@@ -88,13 +96,18 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     })?;
     printer.print(if is_done { &LessonNews::Finished } else { &LessonNews::Stopped });
     printer.failed.into_inner().map_or(Ok(()), Err)?;
-    let (file, program) = (args.out.join(LEARNED), program::name());
+    let best = args.out.join(LEARNED);
+    let (file, is_best) =
+        last.map_or((best.clone(), true), |(file, is_best)| (if is_best { best.clone() } else { file }, is_best));
+    if !is_best {
+        report!("{} stays as it is: an earlier lesson's policy returned more", best.display());
+    }
     if !is_done {
         report!("stopped and saved; the same command goes on");
         return Ok(Outcome::Stopped);
     }
     let file = quoted(&file.to_string_lossy());
-    report!("done: watch it with `{program} play {} --policy {file}`", game.name());
+    report!("done: watch it with `{} play {} --policy {file}`", program::name(), game.name());
     Ok(Outcome::Pass)
 }
 
@@ -103,12 +116,33 @@ fn experiment(args: &Args, games: &Games) -> Result<Experiment, CliError> {
     let options = || [option("steps", &args.steps)];
     let plain = args.from.load(games, options())?;
     let game = args.from.find_game(games, &plain)?;
-    if args.from.experiment.is_some() || game.tools().training.experiment().is_some() {
+    if args.from.experiment.is_some() {
         return Ok(plain);
     }
-    let of_numbers = (!plain.observation_config().is_image()).then_some(OF_NUMBERS);
-    let known = SETTINGS.into_iter().chain(of_numbers).map(str::to_owned);
+    let is_known = game.tools().training.experiment().is_some();
+    let of_numbers = (!is_known && !plain.observation_config().is_image()).then_some(OF_NUMBERS);
+    let settings = if is_known { &[][..] } else { &SETTINGS[..] };
+    let played = played_levels(&args.demos, &plain.train)?.map(|levels| format!("train={levels}"));
+    let known = settings.iter().copied().chain(of_numbers).map(str::to_owned).chain(played);
     Ok(args.from.over(known).load(games, options())?)
+}
+
+/// Returns the recorded levels, at most 64 of them, if they are of another mode than those that would be trained on.
+fn played_levels(demos: &Path, trained: &LevelSplit) -> Result<Option<LevelSplit>, CliError> {
+    let mut played: Option<LevelSplit> = None;
+    for file in find_demos(demos)? {
+        let reader = DemoReader::open(&file)?;
+        let mode = reader.header().mode.clone();
+        if mode == trained.mode || played.as_ref().is_some_and(|played| played.mode != mode) {
+            return Ok(None);
+        }
+        for episode in reader {
+            let level = episode?.level_seed;
+            let all = played.get_or_insert_with(|| LevelSplit::one(mode.clone(), level));
+            (all.first, all.last) = (all.first.min(level), all.last.max(level));
+        }
+    }
+    Ok(played.map(|all| LevelSplit { last: all.last.min(all.first.saturating_add(63)), ..all }))
 }
 
 /// Asks the work to stop when the program that started this one closes our input, or ends.

@@ -9,17 +9,16 @@ use crate::window::{
 };
 use bevy::prelude::*;
 use bevy_playbot::{
-    demo::file::{DemoFileError, DemoHeader, DemoWriter},
+    demo::file::{DemoHeader, DemoWriter},
     engine::{PressesForPeople, flush_unfinished},
     key_bindings::KeyBindings,
-    lesson::{Lesson, LessonNews},
+    lesson::{Lesson, LessonNews, lesson_command},
     policy_file::{DeviceKind, PolicyFile, install_policy},
 };
 use playbot_harness::prelude::*;
 use playbot_learner::ObsKind;
 use playbot_report::counted;
 use std::{
-    ffi::OsString,
     path::{Path, PathBuf},
     process::Command,
 };
@@ -34,8 +33,10 @@ pub struct TeachingSetup {
     pub recording: PathBuf,
     /// Its header.
     pub header: DemoHeader,
-    /// The program with the verb `teach` and this game, and its arguments.
-    pub command: Vec<OsString>,
+    /// The program with the verb `teach` and this game.
+    pub program: PathBuf,
+    /// Further options of the verb.
+    pub options: Vec<String>,
     /// True if the agent of the window sees pictures, for which no policy is learned here.
     pub has_pictures: bool,
 }
@@ -109,19 +110,12 @@ fn toggle_recording(world: &mut World) -> Result<String, String> {
         return Err(format!("the actions of a person in {game} cannot be recorded"));
     }
     let path = teaching.setup.recording.clone();
-    let writer = open(&path, &teaching.setup.header).map_err(|error| error.to_string())?;
+    let writer = DemoWriter::append_or_create(&path, teaching.setup.header.clone());
+    let writer = writer.map_err(|error| error.to_string())?;
     record_into(world, agent, writer);
     // A recorded episode needs its first tick.
     leave_level(world);
     Ok(format!("recording into {}; F9 ends it, F10 learns from it", path.display()))
-}
-
-/// Opens the recording, a new one or one to go on with.
-fn open(path: &Path, header: &DemoHeader) -> Result<DemoWriter, DemoFileError> {
-    match path.exists() {
-        true => DemoWriter::append(path, header),
-        false => DemoWriter::create(path, header.clone()),
-    }
 }
 
 /// Begins to learn, or stops it. Returns what was done.
@@ -142,9 +136,8 @@ fn toggle_lesson(world: &mut World) -> Result<String, String> {
     if !is_recorded && !setup.recording.exists() {
         return Err("nothing is recorded yet: F9 records what you play".to_owned());
     }
-    let [program, args @ ..] = setup.command.as_slice() else { return Err("no program learns".to_owned()) };
-    let mut command = Command::new(program);
-    command.args(args);
+    let mut command = lesson_command(Command::new(&setup.program), &setup.header.game, &setup.recording);
+    command.args(&setup.options);
     let lesson = Lesson::begin(command).map_err(|error| error.to_string())?;
     let mut teaching = world.resource_mut::<Teaching>();
     teaching.lesson = Some(lesson);
@@ -160,14 +153,10 @@ fn hear(world: &mut World) {
     if let Some(last) = news.last() {
         teaching.words = Some(last.to_string());
     }
-    let newest = news.iter().rev().find_map(|one| match one {
-        LessonNews::Policy { file, .. } => Some((file.clone(), one.to_string())),
-        _ => None,
-    });
-    if let Some((file, words)) = newest {
-        let said = match load(world, &file) {
-            Ok(true) => format!("{words}; Tab hands over"),
-            Ok(false) => words,
+    if let Some(newest @ LessonNews::Policy { file, .. }) = LessonNews::newest_policy(&news) {
+        let said = match load(world, file) {
+            Ok(true) => format!("{newest}; Tab hands over"),
+            Ok(false) => newest.to_string(),
             Err(error) => error,
         };
         say(world, said);

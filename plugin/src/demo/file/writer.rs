@@ -117,6 +117,16 @@ impl DemoWriter {
         Ok(Self { path: path.to_owned(), header, store: Box::new(file), length, episodes: 0, torn: false })
     }
 
+    /// [Appends](Self::append) to the file if there is one, and else [creates](Self::create) it.
+    ///
+    /// # Errors
+    ///
+    /// Those of both.
+    pub fn append_or_create(path: impl AsRef<Path>, header: DemoHeader) -> Result<Self, DemoFileError> {
+        let path = path.as_ref();
+        if path.exists() { Self::append(path, &header) } else { Self::create(path, header) }
+    }
+
     /// Opens an existing file to record more episodes under the same conditions.
     ///
     /// The whole file is read and checked first. The header of the file stays as it is.

@@ -17,11 +17,10 @@ use playbot_harness::{
     game::{Game, without_idle_action},
     games::Games,
     level_files::is_level_files,
-    parallel::default_threads,
     split::LevelSplit,
 };
 use playbot_report::counted;
-use std::{ffi::OsString, path::Path};
+use std::path::Path;
 
 /// The last level where the game does not limit them: levels have 32 bits.
 const LAST_LEVEL: u64 = u32::MAX as u64;
@@ -35,8 +34,11 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let header = header(game, playlist.mode(), &args);
     let recording = args.record.clone().unwrap_or_else(|| format!("{}.demo", game.name()).into());
     let has_pictures = observation_config.is_image();
-    let command = lesson(game, &args, &playlist, &recording)?;
-    let teaching = TeachingSetup { recording: recording.clone(), header: header.clone(), command, has_pictures };
+    let program =
+        program::file().map_err(|error| CliError::Io(format!("this program's own path is unknown: {error}")))?;
+    let options = lesson_options(&args, &playlist);
+    let teaching =
+        TeachingSetup { recording: recording.clone(), header: header.clone(), program, options, has_pictures };
     let recorded_before = length(&recording);
     let seed = args.seed.unwrap_or(0);
     let mut window =
@@ -106,20 +108,13 @@ fn autopilot(game: &dyn Game, args: &Args) -> Result<(Option<Autopilot>, Observa
     })
 }
 
-/// Returns the command that learns from the recording in the background. It leaves one core to the window.
-fn lesson(game: &dyn Game, args: &Args, playlist: &Playlist, recording: &Path) -> Result<Vec<OsString>, CliError> {
-    let program = std::env::current_exe()
-        .map_err(|error| CliError::Io(format!("this program's own path is unknown: {error}")))?;
-    let threads = (default_threads() - 1).max(1).to_string();
-    let words = ["teach", game.name(), "--json", "--until-input-ends", "--threads", &threads].map(OsString::from);
-    let mut command = vec![program.into_os_string()];
-    command.extend(words);
-    let folder = recording.with_extension("lessons");
-    command.extend(["--demos".into(), recording.into(), "--out".into(), folder.into_os_string()]);
+/// Returns the options of the lesson in the background.
+fn lesson_options(args: &Args, playlist: &Playlist) -> Vec<String> {
+    let mut options = Vec::new();
     if args.levels.is_some() || args.mode.is_some() {
-        command.extend(["--set".into(), format!("train={}", playlist.trained()).into()]);
+        options.push(format!("--set=train={}", playlist.trained()));
     }
-    Ok(command)
+    options
 }
 
 /// Returns the length of a file in bytes; `None` if there is none.
