@@ -131,13 +131,20 @@ fn note(event: On<OverlayNote>, clock: Res<Time<Real>>, mut overlay: ResMut<Over
     }
 }
 
+impl Overlay {
+    /// Hides it, or shows it again, as its key does.
+    pub fn toggle(&mut self) {
+        self.is_shown = !self.is_shown;
+        // At once, not at the next change of the words.
+        self.changed = Duration::ZERO;
+    }
+}
+
 fn hear_key(keys: Option<Res<ButtonInput<KeyCode>>>, mut overlay: ResMut<Overlay>) {
     if let (Some(keys), Some(key)) = (keys, overlay.key)
         && keys.just_pressed(key)
     {
-        overlay.is_shown = !overlay.is_shown;
-        // At once, not at the next change of the words.
-        overlay.changed = Duration::ZERO;
+        overlay.toggle();
     }
 }
 
@@ -299,7 +306,10 @@ impl Words<'_> {
             if let Some((left, of)) = self.left.filter(|_| !self.z.is_empty()) {
                 let name = NamedSkill::name_of(&self.names.skills, self.z);
                 let name = name.map_or_else(|| format!("of {} values", self.z.len()), |name| format!("\"{name}\""));
-                let _ = write!(words, "\nskill {name}, {left} of {of} ticks left");
+                let _ = match left {
+                    ActiveSkill::HELD => write!(words, "\nskill {name}, held"),
+                    left => write!(words, "\nskill {name}, {left} of {of} ticks left"),
+                };
             }
         }
         if let Some(line) = &self.names.line {

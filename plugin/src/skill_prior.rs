@@ -58,17 +58,40 @@ impl From<&SkillSource> for SkillPrior {
 pub struct ActiveSkill {
     /// The skill as the policy sees it; empty without a [`SkillPrior`].
     pub z: Vec<f32>,
-    /// Ticks until the next draw, this one included; 0 asks for a draw.
+    /// Ticks until the next draw, this one included; 0 asks for a draw, and [`HELD`](Self::HELD) for none.
     pub ticks_left: u32,
 }
 
 impl ActiveSkill {
+    /// The ticks that are left of a skill which is not followed by a draw, not even in the next episode.
+    ///
+    /// ```
+    /// use bevy_playbot::prelude::*;
+    /// use playbot_learner::{Prior, SkillDraw};
+    ///
+    /// let mut app = headless_app();
+    /// let prior = Prior::standard_normal(2, false);
+    /// app.insert_resource(SkillPrior { prior, skill_interval: 10, draw: SkillDraw::Sample });
+    /// let chosen = ActiveSkill { z: vec![0.5, -0.5], ticks_left: ActiveSkill::HELD };
+    /// let agent = (Agent::new(0, ActionSpace::Discrete(2)), Control::Policy, chosen.clone());
+    /// let agent = app.world_mut().spawn(agent).id();
+    /// app.ticks(40).expect("no agent broke its contract");
+    /// assert_eq!(app.world().get::<ActiveSkill>(agent), Some(&chosen));
+    /// ```
+    pub const HELD: u32 = u32::MAX;
+
+    /// Returns whether ticks of it are counted.
+    fn is_counted(&self) -> bool {
+        (1..Self::HELD).contains(&self.ticks_left)
+    }
+
     /// Returns the remaining share of the skill's ticks, this one included, if skills are used for
     /// `skill_interval` ticks. A skill that has run out counts as a whole one, because the next draw
     /// replaces it.
     // Hidden: for rollouts.
     pub fn left(&self, skill_interval: u32) -> f32 {
-        if self.ticks_left == 0 { 1.0 } else { self.ticks_left as f32 / skill_interval.max(1) as f32 }
+        let interval = skill_interval.max(1);
+        if self.ticks_left == 0 { 1.0 } else { self.ticks_left.min(interval) as f32 / interval as f32 }
     }
 }
 
@@ -119,7 +142,7 @@ pub(crate) fn plugin(app: &mut App) {
 /// control.
 pub(crate) fn end_skills(mut agents: Query<(&Episode, &mut ActiveSkill)>) {
     for (episode, mut skill) in &mut agents {
-        if episode.is_running() && episode.tick == 0 && skill.ticks_left > 0 {
+        if episode.is_running() && episode.tick == 0 && skill.is_counted() {
             skill.ticks_left = 0;
         }
     }
@@ -183,7 +206,7 @@ fn misfit(prior: &Prior, agent: &Agent, observation: &Observation, sensor: Optio
 /// Counts one tick of every active skill.
 pub(crate) fn count_down_skills(mut agents: Query<(&Control, &Episode, &mut ActiveSkill)>) {
     for (control, episode, mut skill) in &mut agents {
-        if control.is_active() && episode.is_running() && skill.ticks_left > 0 {
+        if control.is_active() && episode.is_running() && skill.is_counted() {
             skill.ticks_left -= 1;
         }
     }

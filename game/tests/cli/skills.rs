@@ -1,6 +1,7 @@
 //! Tests of `playbot skills`: rollouts of a grid of skills, as lines, as a file and as a page with names.
 
 use std::{
+    collections::BTreeSet,
     fs,
     io::{BufRead, BufReader, Read, Write},
     net::TcpStream,
@@ -53,6 +54,13 @@ fn each_skill_is_rolled_out_from_one_state() {
     assert!(corners[0][0] < 0.0 && corners[0][1] > 0.0 && corners[1][0] > 0.0 && corners[2][1] < 0.0, "{corners:?}");
     assert!(tiles.iter().all(|tile| numbers(&tile["z"])[2] == 0.0));
     assert_eq!(text, done(folder, &with(&["--ticks", "12", "--json"])).0, "the same lines each time");
+    // From the first tick of the episode as well, which ends what an episode before it followed.
+    let start =
+        ["skills", "coinrun", "--mode", "easy", "--policy", "clone.policy", "--level", "7", "--ticks", "20", "--json"];
+    let paths: BTreeSet<String> =
+        json_lines(&done(folder, &start).0).iter().map(|tile| tile["path"].to_string()).collect();
+    assert!(paths.len() > 1, "{paths:?}");
+    assert!(!paths.iter().any(|path| path.starts_with("[[0.0,0.0]")), "{paths:?}");
     let (drawn, _) = done(folder, &with(&["--ticks", "6", "--draw", "3", "--json"]));
     let drawn: Vec<Vec<f64>> = json_lines(&drawn).iter().map(|tile| numbers(&tile["z"])).collect();
     assert!(drawn.len() == 3 && drawn[0] != drawn[1], "{drawn:?}");

@@ -18,7 +18,13 @@
 
 use crate::floor_plan::FloorPlan;
 use bevy::prelude::*;
-use bevy_playbot::{action::ActionValue, episode::EpisodeResult, state_hash::StateHash};
+use bevy_playbot::{
+    action::{Action, ActionValue},
+    episode::{Episode, EpisodeResult},
+    observation::Observation,
+    reward::Reward,
+    state_hash::StateHash,
+};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -197,6 +203,22 @@ impl<'a> DetectorTick<'a> {
             is_success: false,
             proofs: &NoProofs,
         }
+    }
+
+    /// Creates a tick of an agent from its components: all but the position, the height and proofs, for which the game is
+    /// asked. `None` for an entity that is no agent.
+    pub fn of_agent(world: &'a World, agent: Entity, tick: u32) -> Option<Self> {
+        let (episode, action) = (world.get::<Episode>(agent)?, world.get::<Action>(agent)?);
+        Some(Self {
+            agent,
+            level: episode.level,
+            tick,
+            observation: world.get::<Observation>(agent).map_or(&[][..], |seen| seen.vector.as_slice()),
+            state_hash: world.get::<StateHash>(agent).map_or(0, |hash| hash.0),
+            reward: world.get::<Reward>(agent).map_or(0.0, Reward::get),
+            is_success: episode.is_success(),
+            ..Self::of(world, &action.0)
+        })
     }
 
     /// Returns a hash of the known state: the game's own hash, the observation, the position and the height.

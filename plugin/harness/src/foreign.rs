@@ -106,7 +106,7 @@ pub use crate::foreign::clicks::ButtonClicks;
 #[cfg(any(feature = "ldtk", feature = "tiled"))]
 pub use crate::foreign::levels::MapLegend;
 pub use crate::foreign::{
-    guess::PLAYER_NAMES,
+    guess::{PLAYER_NAMES, PlayerGuess},
     levels::{EditorLevel, IntoLevelTextError, LevelFromFile, PlayedMode},
     observe::IntoPlanPosition,
     paths::PathError,

@@ -1,6 +1,12 @@
 //! The program's name: that of its file, whatever games are in it.
 
-use std::{env, ffi::OsStr, path::Path, sync::OnceLock};
+use std::{
+    env,
+    ffi::OsStr,
+    io,
+    path::{Path, PathBuf},
+    sync::OnceLock,
+};
 
 /// The name in texts that do not know their program, such as the errors of libraries.
 pub(crate) const DEFAULT_NAME: &str = "playbot";
@@ -9,6 +15,21 @@ pub(crate) const DEFAULT_NAME: &str = "playbot";
 pub(crate) fn name() -> &'static str {
     static NAME: OnceLock<String> = OnceLock::new();
     NAME.get_or_init(|| env::args_os().next().as_deref().and_then(of_file).unwrap_or(DEFAULT_NAME).to_owned())
+}
+
+/// Returns the file that this program was called by, to start it once more: after a build it is the new one. `None` if it
+/// was found by its name alone.
+pub(crate) fn called_file() -> Option<PathBuf> {
+    env::args_os().next().map(PathBuf::from).filter(|path| path.is_file())
+}
+
+/// Returns a file of this program, to start it once more.
+///
+/// # Errors
+///
+/// The system does not know it.
+pub(crate) fn file() -> io::Result<PathBuf> {
+    called_file().map_or_else(env::current_exe, Ok)
 }
 
 fn of_file(path: &OsStr) -> Option<&str> {

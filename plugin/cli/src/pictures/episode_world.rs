@@ -148,9 +148,10 @@ impl EpisodeWorld {
         self.skill_names = regions;
     }
 
-    /// Follows a skill from the next tick on, for so many ticks.
-    pub fn follow(&mut self, z: &[f32], ticks: u32) {
-        self.world.entity_mut(self.agent).insert(ActiveSkill { z: z.to_vec(), ticks_left: ticks });
+    /// Follows a skill from the next tick on, to the end of the episode.
+    pub fn follow(&mut self, z: &[f32]) {
+        // The episode may begin in that tick, which ends skills that are not held.
+        self.world.entity_mut(self.agent).insert(ActiveSkill { z: z.to_vec(), ticks_left: ActiveSkill::HELD });
     }
 
     /// Draws a skill from a prior, as it would be drawn in the next tick, which is played.
@@ -207,6 +208,11 @@ impl EpisodeWorld {
     /// Returns the position of the agent, if the game reports it.
     pub fn position(&self, game: &dyn Game) -> Option<Vec2> {
         game.tools().state.position(&self.world, self.agent).filter(|position| position.is_finite())
+    }
+
+    /// Returns the number of entities in the World.
+    pub fn entities(&self) -> u32 {
+        self.world.entity_count()
     }
 
     /// Returns the level.

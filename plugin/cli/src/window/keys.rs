@@ -17,6 +17,7 @@ use bevy::{
     },
     prelude::*,
 };
+use bevy_playbot::overlay::Overlay;
 use playbot_harness::prelude::*;
 
 pub(super) fn build(app: &mut App) {
@@ -73,8 +74,17 @@ fn change_level(keys: Res<OwnKeys>, mut playlist: ResMut<Playlist>, mut pace: Re
     commands.queue(leave_level);
 }
 
-/// Pauses with P, zooms with plus and minus, ends with Escape and Ctrl-Q.
-fn other_keys(keys: Res<OwnKeys>, mut pace: ResMut<Pace>, zoom: Option<ResMut<Zoom>>, mut ending: ResMut<Ending>) {
+/// Pauses with P, zooms with plus and minus, hides the overlay with F8, ends with Escape and Ctrl-Q.
+fn other_keys(
+    keys: Res<OwnKeys>,
+    mut pace: ResMut<Pace>,
+    zoom: Option<ResMut<Zoom>>,
+    overlay: Option<ResMut<Overlay>>,
+    mut ending: ResMut<Ending>,
+) {
+    if let Some(mut overlay) = overlay.filter(|_| keys.just_pressed(KeyCode::F8)) {
+        overlay.toggle();
+    }
     if keys.just_pressed(KeyCode::KeyP) {
         pace.toggle_pause();
     }

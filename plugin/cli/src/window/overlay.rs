@@ -3,16 +3,14 @@
 use crate::window::{deciders::Deciders, teaching::Teaching};
 use bevy::prelude::*;
 use bevy_playbot::{
-    action::Action,
     agent::Control,
     engine::TickSchedules,
     episode::EpisodeResult,
-    overlay::{OverlayNames, OverlayNote, PlaybotOverlay},
-    reward::Reward,
-    state_hash::StateHash,
+    overlay::{OverlayNames, OverlayNote, OverlayPosition, PlaybotOverlay},
 };
 use playbot_harness::{
     detector::{Detector, DetectorTick, EpisodeWatcher, LevelAhead, WorldTick, WorldWatcher},
+    foreign::PlayerGuess,
     prelude::*,
 };
 use playbot_test::detectors::Detectors;
@@ -25,10 +23,11 @@ pub(super) fn build(app: &mut App, game: &dyn Game, agent: Entity) {
     app.world_mut().entity_mut(agent).insert(names);
     let detectors = Detectors::defaults(game).ticks;
     let worlds = detectors.iter().filter_map(|detector| Some((detector.name(), detector.watch_world()?))).collect();
-    app.add_plugins(PlaybotOverlay::default())
+    // Its key is one of the window's own, which the game may not see.
+    app.add_plugins(PlaybotOverlay { key: None, ..default() })
         .init_resource::<LastEnd>()
         .add_observer(note_end)
-        .add_systems(Last, name_decider);
+        .add_systems(Last, (name_decider, find_player));
     app.world_mut().insert_non_send(Watching { detectors, worlds, episode: None });
     let judge = TickSchedules::of(app).judge;
     app.add_systems(judge, watch.after(PlaybotSystems::Reset).ambiguous_with_all());
@@ -48,6 +47,18 @@ fn name_decider(
     let line = (!lines.is_empty()).then(|| lines.join("\n"));
     if names.decider != decider || names.line != line {
         (names.decider, names.line) = (decider, line);
+    }
+}
+
+/// Finds the entity that the trail follows, in games whose agent is an entity beside it.
+fn find_player(world: &mut World, mut guess: Local<PlayerGuess>) {
+    let agent = world.resource::<Deciders>().agent;
+    let is_known = |entity| world.get::<GlobalTransform>(entity).is_some();
+    if is_known(agent) || world.get::<OverlayPosition>(agent).is_some_and(|position| is_known(position.0)) {
+        return;
+    }
+    if let Some(player) = guess.entity(world) {
+        world.entity_mut(agent).insert(OverlayPosition(player));
     }
 }
 
@@ -73,7 +84,8 @@ struct Watching {
     episode: Option<(u64, Vec<Named<dyn EpisodeWatcher>>)>,
 }
 
-/// Shows the findings of a tick as notes. A detector that has found something is silent for the rest of the episode.
+/// Shows the findings of a tick as notes. A detector that has found something is silent for the rest of the episode, or of
+/// the session if it looks at the whole World.
 fn watch(world: &mut World) {
     let Some(mut watching) = world.remove_non_send::<Watching>() else { return };
     let result = world.resource_mut::<LastEnd>().0.take();
@@ -87,8 +99,7 @@ impl Watching {
     fn look(&mut self, world: &World, result: Option<EpisodeResult>) -> Vec<(&'static str, String)> {
         let mut found = Vec::new();
         let agent = world.resource::<Deciders>().agent;
-        let parts = (world.get::<Episode>(agent), world.get::<Action>(agent), world.get::<Reward>(agent));
-        let (Some(episode), Some(action), Some(reward)) = parts else { return found };
+        let Some(episode) = world.get::<Episode>(agent) else { return found };
         if result.is_none() && !(episode.is_running() && episode.tick > 0) {
             return found;
         }
@@ -102,16 +113,9 @@ impl Watching {
             let watch = |detector: &Arc<dyn Detector>| Some((detector.name(), detector.watch(&ahead)?));
             (level, self.detectors.iter().filter_map(watch).collect())
         });
-        let moment = DetectorTick {
-            agent,
-            level,
-            tick: ticks.saturating_sub(1),
-            observation: world.get::<Observation>(agent).map_or(&[][..], |seen| seen.vector.as_slice()),
-            state_hash: world.get::<StateHash>(agent).map_or(0, |hash| hash.0),
-            reward: reward.get(),
-            is_success: result.map_or_else(|| episode.is_success(), |result| result.success),
-            ..DetectorTick::of(world, &action.0)
-        };
+        let Some(seen) = DetectorTick::of_agent(world, agent, ticks.saturating_sub(1)) else { return found };
+        let is_success = result.map_or(seen.is_success, |result| result.success);
+        let moment = DetectorTick { level, is_success, ..seen };
         watches.retain_mut(|(detector, watch)| {
             let message = watch.tick(&moment).or_else(|| result.and_then(|result| watch.end(&moment, &result)));
             let is_silent = message.is_none();

@@ -23,9 +23,9 @@ const WORD: &str = "Player";
 /// Crates of Bevy, whose components such as `AudioPlayer` mark no agent.
 const ENGINE: [&str; 3] = ["bevy::", "bevy_", "core::"];
 
-/// The signs of the agent's entity in a World.
+/// The signs of the agent's entity in a World, for guessing which entity a person plays.
 #[derive(Default)]
-pub(super) struct Guess {
+pub struct PlayerGuess {
     /// Number of components when the signs were looked up.
     known: usize,
     /// The signs, the most certain first.
@@ -42,10 +42,24 @@ enum Sign {
     Name(String),
 }
 
-impl Guess {
-    /// Returns the position of the one entity with the most certain sign that any entity has; `None` if there are
-    /// several. `paths` are those of `.observe_paths`.
+impl PlayerGuess {
+    /// Returns the one entity with the most certain sign that any entity has; `None` if there are several.
+    pub fn entity(&mut self, world: &World) -> Option<Entity> {
+        self.find(world, &[]).map(|(entity, _)| entity)
+    }
+
+    /// Returns the position of that entity. `paths` are those of `.observe_paths`.
     pub(super) fn position(&mut self, world: &World, paths: &[String]) -> Option<GuessedPosition> {
+        let (entity, sign) = self.find(world, paths)?;
+        let at = translation(world, entity)?;
+        let description = sign.describe(world, entity);
+        let is_in_space = self.camera.is_some_and(|camera| has_any(world, camera));
+        // Seen from above, as positions in space are.
+        let position = if is_in_space { at.xz() } else { at.truncate() };
+        Some(GuessedPosition { position, entity: description })
+    }
+
+    fn find(&mut self, world: &World, paths: &[String]) -> Option<(Entity, &Sign)> {
         let components = world.components().num_registered();
         if self.known != components {
             *self = Self {
@@ -55,16 +69,10 @@ impl Guess {
             };
         }
         for sign in &self.signs {
-            let found = sign.entities(world);
-            if let [entity] = found.as_slice() {
-                let at = translation(world, *entity)?;
-                let is_in_space = self.camera.is_some_and(|camera| has_any(world, camera));
-                // Seen from above, as positions in space are.
-                let position = if is_in_space { at.xz() } else { at.truncate() };
-                return Some(GuessedPosition { position, entity: sign.describe(world, *entity) });
-            }
-            if !found.is_empty() {
-                return None;
+            match sign.entities(world).as_slice() {
+                [] => {}
+                [entity] => return Some((*entity, sign)),
+                _ => return None,
             }
         }
         None
@@ -183,7 +191,7 @@ mod tests {
         ];
         let mine = mine.into_iter().filter_map(|(name, component)| Some((name.to_owned(), component?)));
         let mine: Vec<_> = mine.collect();
-        let mut guess = Guess {
+        let mut guess = PlayerGuess {
             known: components.num_registered(),
             signs: signs(world, &paths, &mine),
             camera: component_of(world, "Camera3d"),

@@ -2,7 +2,7 @@
 
 use crate::{
     detector::LevelProof,
-    foreign::{ForeignGame, clocks::ClockSettings, guess::Guess, paths::ObservedPath},
+    foreign::{ForeignGame, clocks::ClockSettings, guess::PlayerGuess, paths::ObservedPath},
     game::Snapshot,
 };
 use bevy::{
@@ -142,7 +142,7 @@ pub(super) struct Foreign {
     /// The place of the agent that is asked about.
     asked: usize,
     /// The position, if none is declared.
-    pub(super) guess: Guess,
+    pub(super) guess: PlayerGuess,
     pub(super) proof: Option<OwnedReader<LevelProof>>,
     pub(super) save: Option<OwnedReader<Snapshot>>,
     /// The error of a proof, until the next tick reports it.
@@ -179,7 +179,7 @@ impl Foreign {
         Self {
             agents: (0..description.agents.count()).map(|_| AgentParts::new(game)).collect(),
             asked: 0,
-            guess: Guess::default(),
+            guess: PlayerGuess::default(),
             proof: description.proof.as_ref().map(|system| system.make()),
             save: description.snapshot.as_ref().and_then(|parts| parts.reader()),
             failed_proof: None,

@@ -5,6 +5,9 @@ use bevy_playbot::skill_prior::NamedSkill;
 use playbot_harness::sealed_file::io_error;
 use std::{fs, io, path::Path};
 
+/// Name of the file in the folder of a run, and the ending of one beside a policy: see [`PlayerArgs::names_file`].
+const ENDING: &str = "skill-names.json";
+
 /// The named regions of a policy's skills.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct SkillNames {
@@ -24,9 +27,30 @@ impl SkillNames {
         };
         let regions = serde_json::from_str(&text).map_err(|error| {
             let path = path.display();
-            CliError::Usage(format!("{path}: not a list of named skills ({error}): name another file with --names"))
+            CliError::Usage(format!(
+                "{path}: not a list of named skills ({error}): mend or remove it, or name another file with `playbot skills \
+                 --names`"
+            ))
         })?;
         Ok(Self { regions })
+    }
+
+    /// Reads the names of the skills of a policy's file, from the file beside it.
+    ///
+    /// # Errors
+    ///
+    /// As for [`read`](Self::read).
+    pub fn beside_policy(policy: &Path) -> Result<Self, CliError> {
+        Self::read(&policy.with_extension(ENDING))
+    }
+
+    /// Reads the names of the skills of a run, from the file in its folder.
+    ///
+    /// # Errors
+    ///
+    /// As for [`read`](Self::read).
+    pub fn of_run(folder: &Path) -> Result<Self, CliError> {
+        Self::read(&folder.join(ENDING))
     }
 
     /// Reads the names of a player's skills; none for a bot.
@@ -82,6 +106,11 @@ mod tests {
         names.write(&path).expect("writable");
         let read = SkillNames::read(&path).expect("it is there");
         assert_eq!(read, names);
+        names.write(&folder.path().join("bot.skill-names.json")).expect("writable");
+        assert_eq!(SkillNames::beside_policy(&folder.path().join("bot.policy")).expect("it is there"), names);
+        assert_eq!(SkillNames::of_run(folder.path()).expect("none yet"), SkillNames::default());
+        names.write(&folder.path().join("skill-names.json")).expect("writable");
+        assert_eq!(SkillNames::of_run(folder.path()).expect("it is there"), names);
         assert_eq!(read.of(&[0.1, 0.8]), Some("jump"));
         assert_eq!(read.of(&[-0.9, -0.9]), None);
         let renamed = read.with(region("leap", [0.0, 0.8]));

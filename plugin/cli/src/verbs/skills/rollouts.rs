@@ -72,9 +72,11 @@ impl Rollouts<'_> {
     pub fn of(&mut self, z: &[f32], names: &SkillNames) -> Result<Rollout, CliError> {
         let mut world = self.state()?;
         world.name_skills(names.regions.clone());
-        world.follow(z, self.ticks);
+        world.follow(z);
         let (mut steps, mut reach, mut path) = (Vec::new(), Reach::default(), Vec::new());
-        path.extend(world.position(self.game).map(|position| position.to_array()));
+        // Before the first tick nobody is anywhere.
+        let start = if self.tick > 0 { world.position(self.game) } else { None };
+        path.extend(start.map(|position| position.to_array()));
         while (steps.len() as u32) < self.ticks {
             let Some(step) = world.next()? else { break };
             reach.include(&step.vector);
