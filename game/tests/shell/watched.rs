@@ -1,6 +1,7 @@
 //! Tests of `playbot watch`: level files are tested when they are saved, and the page hears of it.
 
 use std::{
+    collections::BTreeSet,
     fs,
     io::{BufRead, BufReader, Lines, Write},
     net::TcpStream,
@@ -32,8 +33,12 @@ impl Drop for Watch {
 impl Watch {
     /// Starts a watch, and listens as its page does.
     fn start(folder: &Path, args: &[&str]) -> Self {
-        let watch = ["watch", "coinrun", "--port", "0"];
-        let mut program = command(folder, &[&watch, args].concat());
+        Self::of(command(folder, &[]), args)
+    }
+
+    /// Starts a watch of this program.
+    fn of(mut program: Command, args: &[&str]) -> Self {
+        program.args(["watch", "coinrun", "--port", "0"]).args(args);
         let mut child = program.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("it starts");
         let mut errors = BufReader::new(child.stderr.take().expect("a pipe")).lines();
         let address = errors.by_ref().map_while(Result::ok).find_map(|line| {
@@ -50,18 +55,39 @@ impl Watch {
     /// Waits for the next event whose final state of this level is as wanted, and returns the state. No final state in
     /// between may be another.
     fn next_final(&mut self, level: &str) -> Value {
+        self.next(|save| finals(save).into_iter().find(|state| state["level"] == level).cloned())
+    }
+
+    /// Waits for the next event with a save in which `find` finds a value, and returns it.
+    fn next<T>(&mut self, find: impl Fn(&Value) -> Option<T>) -> T {
         loop {
             let line = self.events.next().expect("the page goes on").expect("an event in time");
             let Some(data) = line.strip_prefix("data: ") else { continue };
             let data: Value = serde_json::from_str(data).expect("JSON");
             let saves = data.as_array().cloned().unwrap_or_else(|| vec![data]);
-            let states = saves.iter().flat_map(|save| save["levels"].as_array().cloned().unwrap_or_default());
-            let state = states.rev().find(|state| state["level"] == level && state["verdict"]["is_final"] == true);
-            if let Some(state) = state {
-                return state;
+            if let Some(found) = saves.iter().rev().find_map(&find) {
+                return found;
             }
         }
     }
+
+    /// Waits for a line on standard error with these words.
+    fn said(&mut self, words: &str) {
+        let found = self.errors.by_ref().map_while(Result::ok).find(|line| line.contains(words));
+        assert!(found.is_some(), "it does not say: {words}");
+    }
+}
+
+/// Returns the final states of a save.
+fn finals(save: &Value) -> Vec<&Value> {
+    save["levels"].as_array().into_iter().flatten().filter(|state| state["verdict"]["is_final"] == true).collect()
+}
+
+/// Saves a file in one piece, so that a watch sees one save.
+fn save_whole(folder: &Path, name: &str, text: &str) {
+    let fresh = folder.join("fresh");
+    fs::write(&fresh, text).expect("writable");
+    fs::rename(fresh, folder.join(name)).expect("writable");
 }
 
 /// Writes a level of the game to a file, and returns its text.
@@ -176,4 +202,131 @@ fn levels_are_tested_once_for_scripts() {
     assert!(words.lines().all(|line| line.starts_with("easy:") && line.contains(": solved in ")), "{words}");
     let (_, errors) = ended(folder, &["watch", "coinrun", "--levels", "easy:3..4", "--port", "0"], 3);
     assert!(errors.contains("there is no assets; name what the levels depend on"), "{errors}");
+}
+
+#[test]
+fn two_levels_that_are_saved_at_once_are_both_tested() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let text = drawn(folder, "a.json");
+    drawn(folder, "b.json");
+    let mut watch = Watch::start(folder, &["--levels", "files:*.json"]);
+    watch.next(|save| (finals(save).len() == 2).then_some(()));
+    for file in ["a.json", "b.json"] {
+        save_whole(folder, file, &broken(&text));
+    }
+    // The watch may have seen them in one look, or in two.
+    let mut missing = BTreeSet::from(["a.json", "b.json"]);
+    while !missing.is_empty() {
+        let unsolved = watch.next(|save| {
+            let states = finals(save).into_iter().filter(|state| state["verdict"]["outcome"] != "solved");
+            let levels: Vec<String> = states.filter_map(|state| Some(state["level"].as_str()?.to_owned())).collect();
+            (!levels.is_empty()).then_some(levels)
+        });
+        missing.retain(|level| !unsolved.iter().any(|found| found == level));
+    }
+}
+
+#[test]
+fn an_undo_while_a_level_is_tested_brings_its_verdict_back() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let text = drawn(folder, "a.json");
+    // The explorer of a level without a path plays for so long that the undo comes before its end.
+    let mut watch = Watch::start(folder, &["--levels", "files:*.json", "--steps", "50000000"]);
+    assert_eq!(watch.next_final("a.json")["verdict"]["outcome"], "solved");
+    save_whole(folder, "a.json", &broken(&text));
+    watch.next(|save| {
+        let verdict = &save["levels"][0]["verdict"];
+        let is_begun = verdict["is_final"] == false && verdict["outcome"].is_string();
+        (is_begun && verdict["outcome"] != "solved").then_some(())
+    });
+    save_whole(folder, "a.json", &text);
+    watch.next(|save| finals(save).iter().any(|state| state["verdict"]["outcome"] == "solved").then_some(()));
+}
+
+/// Returns a program with levels of an editor: its new processes test the files in `levels` instead of those that were
+/// named. They fail as long as there is a file `half`.
+fn with_editor(folder: &Path) -> Command {
+    let script = r#"#!/bin/bash
+program=PROGRAM
+case " $* " in *" --known "*) ;; *) exec -a "$0" "$program" "$@" ;; esac
+if [ -e half ]; then echo "levels.ldtk: half of a file" >&2; exit 101; fi
+exec -a "$0" "$program" "${@//easy:3..3/files:levels/*.json}"
+"#;
+    let file = folder.join("bots");
+    fs::write(&file, script.replace("PROGRAM", &format!("'{}'", env!("CARGO_BIN_EXE_playbot")))).expect("writable");
+    let made = Command::new("chmod").arg("+x").arg(&file).status().expect("a shell's chmod");
+    assert!(made.success());
+    let mut program = Command::new(file);
+    program.current_dir(folder);
+    program
+}
+
+#[test]
+fn levels_of_an_editor_are_tested_by_new_processes_whose_failure_is_a_problem() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    fs::create_dir(folder.join("levels")).expect("writable");
+    let text = drawn(folder, "levels/a.json");
+    drawn(folder, "levels/b.json");
+    let (a, b) = ("levels/a.json", "levels/b.json");
+    let mut watch = Watch::of(with_editor(folder), &["--levels", "easy:3..3", "--assets", "levels"]);
+    watch.next(|save| {
+        let is_solved = |state: &Value| state["verdict"]["outcome"] == "solved";
+        (finals(save).into_iter().filter(|state| is_solved(state)).count() == 2).then_some(())
+    });
+    // Broken, and undone to what was tested before.
+    save_whole(folder, a, &broken(&text));
+    watch.next(|save| finals(save).iter().any(|state| state["verdict"]["outcome"] != "solved").then_some(()));
+    save_whole(folder, a, &text);
+    let levels = watch.next(|save| {
+        let levels = save["levels"].as_array()?;
+        levels.iter().any(|state| state["verdict"]["outcome"] == "solved").then(|| levels.clone())
+    });
+    assert!(levels.len() == 1 && levels[0]["level"] == a, "the other one is unchanged: {levels:?}");
+
+    // A process that fails is no test.
+    fs::write(folder.join("half"), "").expect("writable");
+    save_whole(folder, a, &broken(&text));
+    let problem = watch.next(|save| save["problem"].as_str().map(str::to_owned));
+    assert!(problem.contains("failed with exit code 101"), "{problem}");
+    assert!(problem.ends_with("levels.ldtk: half of a file"), "{problem}");
+    fs::remove_file(folder.join("half")).expect("it is there");
+    // Exactly as before the failure: no level is tested, and the problem is over.
+    save_whole(folder, a, &text);
+    watch.said("all levels are as they were before that save");
+    watch.next(|save| save["problem"].is_null().then_some(()));
+
+    // Deleted in the editor.
+    fs::remove_file(folder.join(b)).expect("it is there");
+    let gone = watch.next(|save| save["gone"].as_array().cloned());
+    assert_eq!(gone, [b]);
+}
+
+#[test]
+fn a_build_that_failed_stays_due() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    for made in ["src", "assets"] {
+        fs::create_dir(folder.join(made)).expect("writable");
+    }
+    let levels = ["--levels", "easy:3..3", "--rebuild", "test ! -e src/wrong || { echo wrong code; false; }"];
+    let mut watch = Watch::start(folder, &levels);
+    watch.next(|save| finals(save).first().map(|_| ()));
+    fs::write(folder.join("src/wrong"), "").expect("writable");
+    let problem = |save: &Value| save["problem"].as_str().map(|words| (save["number"].clone(), words.to_owned()));
+    let (first, words) = watch.next(problem);
+    assert!(words.ends_with("wrong code"), "{words}");
+    // Another file is saved: the code still does not build.
+    fs::write(folder.join("assets/a"), "").expect("writable");
+    let (second, words) = watch.next(|save| problem(save).filter(|(number, _)| *number != first));
+    assert!(words.ends_with("wrong code") && second.as_u64() > first.as_u64(), "{words}");
+    fs::remove_file(folder.join("src/wrong")).expect("it is there");
+    let state = watch.next(|save| {
+        let state = &save["levels"][0];
+        (save["problem"].is_null() && state["verdict"]["is_final"] == true && save["number"].as_u64() > second.as_u64())
+            .then(|| state.clone())
+    });
+    assert_eq!(state["verdict"]["outcome"], "solved", "all levels are tested after a build: {state}");
 }

@@ -89,7 +89,7 @@ impl Loopback {
 fn hear(mut stream: TcpStream, port: u16, respond: &dyn Fn(Request, Answer)) {
     let Ok(Some(request)) = read_request(&mut stream) else { return };
     let answer = Answer(stream);
-    let own = ["127.0.0.1", "localhost"].map(|name| format!("{name}:{port}"));
+    let own = own_hosts(port);
     // A foreign page could ask under a name that leads here, or send a form.
     let is_ours = own.contains(&request.host)
         && request.origin.as_ref().is_none_or(|origin| own.iter().any(|own| *origin == format!("http://{own}")));
@@ -99,6 +99,17 @@ fn hear(mut stream: TcpStream, port: u16, respond: &dyn Fn(Request, Answer)) {
         (true, false) => answer.plain("405 Method Not Allowed", "This page is only read."),
         (true, true) => respond(request, answer),
     }
+}
+
+/// Returns the names by which browsers ask for a port of this machine.
+fn own_hosts(port: u16) -> Vec<String> {
+    let names = ["127.0.0.1", "localhost"];
+    let mut hosts: Vec<String> = names.iter().map(|name| format!("{name}:{port}")).collect();
+    // Browsers leave out the usual port of their protocol.
+    if port == 80 {
+        hosts.extend(names.map(str::to_owned));
+    }
+    hosts
 }
 
 impl Answer {
@@ -243,6 +254,12 @@ mod tests {
             let text = ask(first, &more);
             assert!(text.starts_with(&format!("HTTP/1.1 {status}")), "{first} {more}: {text}");
         }
+    }
+
+    #[test]
+    fn the_usual_port_of_browsers_may_be_left_out() {
+        assert_eq!(own_hosts(80), ["127.0.0.1:80", "localhost:80", "127.0.0.1", "localhost"]);
+        assert_eq!(own_hosts(8080), ["127.0.0.1:8080", "localhost:8080"]);
     }
 
     #[test]

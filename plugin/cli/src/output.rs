@@ -209,15 +209,25 @@ pub(crate) fn make_folder_of(path: &Path) -> Result<(), CliError> {
         .map_err(|error| CliError::Io(format!("cannot create {}: {error}; {ELSEWHERE}", folder.display())))
 }
 
+/// Checks that the path of a folder to write into is not a file's.
+///
+/// # Errors
+///
+/// It is.
+pub(crate) fn check_folder(folder: &Path) -> Result<(), CliError> {
+    if folder.is_file() {
+        return Err(CliError::Usage(format!("{} is a file: name a folder to write into", folder.display())));
+    }
+    Ok(())
+}
+
 /// Makes a folder to write into.
 ///
 /// # Errors
 ///
 /// The path is a file's, or the system refuses.
 pub(crate) fn make_folder(folder: &Path) -> Result<(), CliError> {
-    if folder.is_file() {
-        return Err(CliError::Usage(format!("{} is a file: name a folder to write into", folder.display())));
-    }
+    check_folder(folder)?;
     disk::create_dir_all(folder).map_err(|error| {
         CliError::Io(format!(
             "cannot create {}: {error}; make room or rights there, or name another folder",
@@ -242,13 +252,22 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
 ///
 /// There is such a file already, or it cannot be written.
 pub(crate) fn print_or_write(data: &str, out: Option<&Path>) -> Result<(), CliError> {
-    let Some(path) = out else { return print_line(data) };
-    if path.exists() {
+    if let Some(path) = out.filter(|path| path.exists()) {
         return Err(CliError::Usage(format!(
             "{} exists already; nothing was written: name another --out, or remove that file first",
             path.display()
         )));
     }
+    print_or_replace(data, out)
+}
+
+/// Prints data, or writes it to a file if one is named, which is replaced if it is there.
+///
+/// # Errors
+///
+/// It cannot be written.
+pub(crate) fn print_or_replace(data: &str, out: Option<&Path>) -> Result<(), CliError> {
+    let Some(path) = out else { return print_line(data) };
     write(path, format!("{data}\n").as_bytes())?;
     report!("written: {}", path.display());
     Ok(())

@@ -58,6 +58,9 @@ pub struct QuickVerdict {
     pub lost: u64,
     /// Episodes whose time was up.
     pub timed_out: u64,
+    /// True if each tester reached the goal in its first tick. Older saves lack it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub solved_at_start: bool,
     /// Why the level cannot be solved, if that is proved.
     pub why: Option<String>,
     /// What the stored solution does now, if it no longer solves the level.
@@ -133,6 +136,7 @@ pub fn judge_quickly(
     }
     known.lost = tested.score.lost;
     known.timed_out = tested.score.timed_out;
+    known.solved_at_start = tested.solved_at_start;
     known.why = tested.proof.why_unsolvable().map(str::to_owned);
     known.outcome = Some(tested.outcome);
     known.findings = tested.findings;
@@ -147,6 +151,9 @@ pub fn judge_quickly(
         // The test has found the same, or the game is one that cannot be explored.
         Err(error) => {
             known.findings.extend(unexplored(&known, &error));
+            // The level itself, if there is nothing else to show.
+            let empty = || floor.as_ref().and_then(|floor| picture(floor, &[], &[], None));
+            known.picture = known.picture.or_else(empty);
             return Ok(Some(finished(known, ways)));
         }
     };

@@ -24,7 +24,7 @@ use crate::{
         watch::{
             changes::{Edited, LevelFiles, Stamp},
             page::Page,
-            rebuilt::{Rebuilt, Sources},
+            rebuilt::{LevelLine, Rebuilt, Sources, TestEnd, UnchangedLevel, read_layouts},
             saves::{LevelState, Save, Saves},
             solutions::Solutions,
         },
@@ -41,6 +41,7 @@ use playbot_test::{
     quick::{QuickPlan, QuickVerdict, judge_quickly},
     verdict::{LevelOutcome, maps::level_name},
 };
+use serde::Serialize;
 use std::{
     collections::{BTreeMap, BTreeSet},
     path::PathBuf,
@@ -107,9 +108,9 @@ pub struct Args {
     /// Test all levels once, without a page.
     #[arg(long)]
     once: bool,
-    /// Leave out levels of these layouts, separated by commas: they were tested already.
-    #[arg(long, value_name = "HASH", value_delimiter = ',', hide = true, requires = "once")]
-    known: Option<Vec<String>>,
+    /// File with the layouts of levels that were tested already, by their names: only say that these are unchanged.
+    #[arg(long, value_name = "FILE", hide = true, requires = "once")]
+    known: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) compute: Compute,
     /// Print one line of JSON per level, with its picture, instead of words.
@@ -130,10 +131,16 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     if args.detectors.list_detectors {
         return list_detectors(game, args.json);
     }
-    report_agents_along(game);
+    // A part of another watch, which has printed the rest.
+    let is_part = args.known.is_some();
+    if !is_part {
+        report_agents_along(game);
+    }
     let split = args.levels.clone().unwrap_or_else(|| {
         let default = default_tested(game);
-        report!("no --levels are named: {default}");
+        if !is_part {
+            report!("no --levels are named: {default}");
+        }
         default
     });
     let is_files = is_level_files(&split.mode);
@@ -147,8 +154,9 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
         steps: args.steps,
         threads: args.compute.threads(),
     };
-    let (saves, message) = Saves::open(&args.out, args.known.is_some())?;
-    message.iter().for_each(|message| report!("warning: {message}"));
+    let layouts = args.known.as_deref().map(read_layouts).transpose()?;
+    let (saves, message) = Saves::open(&args.out, is_part)?;
+    message.iter().filter(|_| !is_part).for_each(|message| report!("warning: {message}"));
     let page = if args.once { None } else { Some(Page::open(args.port, PORT, game.name(), saves.all())?) };
     if let Some(page) = &page {
         report!(
@@ -160,8 +168,9 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     interrupt::leave(format!("all saves so far are kept in {}", args.out.display()));
     interrupt::listen();
     let solutions = Solutions::new(game, &args.out);
-    let asks_stored = !args.once || args.known.is_some();
-    let mut watch = Watch { game, plan, saves, solutions, page, json: args.json, asks_stored };
+    let asks_stored = !args.once || is_part;
+    let mut watch =
+        Watch { game, plan, saves, solutions, page, json: args.json, asks_stored, no_picture_is_reported: false };
     match (is_files, args.once) {
         (true, false) => watch.files(&LevelFiles::new(&split)?),
         (true, true) => {
@@ -169,16 +178,17 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
             if let Some(problem) = problem {
                 return Err(CliError::Usage(problem.to_string()));
             }
-            watch.once(files.into_keys().map(|path| (LevelSplit::one(level_files_mode(&path), 0), path)), None)
+            let named = files.into_keys().map(|path| (LevelSplit::one(level_files_mode(&path), 0), path));
+            watch.once(named, layouts.as_ref())
         }
         (false, true) => {
             let levels = split.levels().map(|level| LevelSplit::one(split.mode.clone(), level));
             let named = levels.map(|level| (level.clone(), title(game, &level)));
-            watch.once(named, args.known.as_deref())
+            watch.once(named, layouts.as_ref())
         }
         (false, false) => {
             let sources = Sources::new(&args.code, &args.assets, args.rebuild.clone())?;
-            watch.rebuilt(&Rebuilt::new(&split, &args.out), &sources)
+            watch.rebuilt(&Rebuilt::new(&args.out), &sources)
         }
     }
 }
@@ -202,6 +212,7 @@ struct Watch<'a> {
     json: bool,
     /// Whether the actions that solved a level before are played.
     asks_stored: bool,
+    no_picture_is_reported: bool,
 }
 
 impl Watch<'_> {
@@ -267,6 +278,9 @@ impl Watch<'_> {
                         if hash.is_some() && tested.get(&path).copied() == hash {
                             continue;
                         }
+                        // A test that is stopped leaves a part of its verdict on the page: the level is due again then,
+                        // whatever its layout.
+                        tested.remove(&path);
                         let edited = Edited::new(&path, known.get(&path).copied());
                         if self.level(&mut save, &split, &path, &|| interrupt::asked() || edited.is_again())? {
                             tested.extend(hash.map(|hash| (path, hash)));
@@ -287,36 +301,25 @@ impl Watch<'_> {
     /// Watches levels that only a new process can test.
     fn rebuilt(&mut self, levels: &Rebuilt, sources: &Sources) -> Result<Outcome, CliError> {
         let mut seen = sources.look();
-        let mut tested = BTreeSet::new();
-        let (mut is_due, mut is_first) = (true, true);
-        let mut build = false;
+        // The layout of each level when it was tested last.
+        let mut tested = BTreeMap::new();
+        let (mut is_due, mut build) = (true, false);
         loop {
             if is_due {
                 let mut save = Save::new(self.saves.next());
                 if build {
                     tested.clear();
                 }
-                if let Some(problem) = sources.rebuild(build, &interrupt::asked) {
+                let is_kept = if let Some(problem) = sources.rebuild(build, &interrupt::asked) {
                     report!("{problem}");
                     save.problem = Some(problem);
                     self.publish(&save);
+                    true
                 } else {
-                    let mut found = BTreeSet::new();
-                    levels.test(&tested, &interrupt::asked, &mut |state| {
-                        found.extend(state.layout.clone());
-                        self.note(&mut save, state)
-                    })?;
-                    tested.extend(found);
-                    let now: BTreeSet<String> = save.levels.iter().map(|state| state.level.clone()).collect();
-                    if is_first {
-                        save.gone = self.saves.levels().difference(&now).cloned().collect();
-                        self.publish(&save);
-                    } else if save.is_empty() {
-                        report!("all levels are as they were before that save");
-                    }
-                    is_first = false;
-                }
-                if !save.is_empty() {
+                    build = false;
+                    self.in_process(&mut save, levels, &mut tested)?
+                };
+                if is_kept {
                     self.saves.add(save)?;
                 }
             }
@@ -326,24 +329,83 @@ impl Watch<'_> {
             thread::park_timeout(GLANCE);
             let now = sources.look();
             // Some programs save several files, one after the other.
-            (is_due, build) = (now != seen, now.code != seen.code);
+            is_due = now != seen;
+            // A build that failed stays due.
+            build |= now.code != seen.code;
             seen = now;
         }
     }
 
-    /// Tests levels once, but for those of a known layout. If these are given, a watch that goes on keeps the save.
+    /// Tests in a process the levels whose layout differs from that of their last test. Returns whether the save is to be
+    /// kept.
+    fn in_process(
+        &mut self,
+        save: &mut Save,
+        levels: &Rebuilt,
+        tested: &mut BTreeMap<String, String>,
+    ) -> Result<bool, CliError> {
+        let known = tested.clone();
+        let mut there = BTreeSet::new();
+        let end = levels.test(&known, &interrupt::asked, &mut |line| match line {
+            LevelLine::Unchanged(UnchangedLevel { unchanged }) => {
+                there.insert(unchanged);
+                Ok(())
+            }
+            LevelLine::Tested(state) => {
+                there.insert(state.level.clone());
+                match &state.layout {
+                    Some(layout) => tested.insert(state.level.clone(), layout.clone()),
+                    None => tested.remove(&state.level),
+                };
+                self.note(save, *state)
+            }
+        })?;
+        match end {
+            TestEnd::Done => {}
+            TestEnd::Failed(problem) => {
+                // The rest is what the process has said itself.
+                report!("{}", problem.lines().next().unwrap_or_default());
+                save.problem = Some(problem);
+                self.publish(save);
+                return Ok(true);
+            }
+            TestEnd::Stopped => return Ok(!save.is_empty()),
+        }
+        let mut shown = self.saves.levels();
+        shown.extend(known.into_keys());
+        save.gone = shown.difference(&there).cloned().collect();
+        for level in &save.gone {
+            tested.remove(level);
+            if !self.json {
+                print_line(format!("{level}: gone"))?;
+            }
+        }
+        if save.is_empty() {
+            report!("all levels are as they were before that save");
+        }
+        // A save without any change ends the problem of the one before.
+        let is_kept = !save.is_empty() || self.saves.all().last().is_some_and(|last| last.problem.is_some());
+        if is_kept {
+            self.publish(save);
+        }
+        Ok(is_kept)
+    }
+
+    /// Tests levels once. If layouts are given, the process belongs to a watch that goes on: that one keeps the save, and
+    /// levels with the layout of their last test are only named.
     fn once(
         &mut self,
         levels: impl Iterator<Item = (LevelSplit, String)>,
-        known: Option<&[String]>,
+        known: Option<&BTreeMap<String, String>>,
     ) -> Result<Outcome, CliError> {
         let mut save = Save::new(self.saves.next());
         for (split, name) in levels {
             if interrupt::asked() {
                 return self.stopped();
             }
-            let layout = self.layout(&split);
-            if layout.as_ref().is_some_and(|layout| known.is_some_and(|known| known.contains(layout))) {
+            let last = known.and_then(|known| known.get(&name));
+            if last.is_some() && self.layout(&split).as_ref() == last {
+                print_json(&UnchangedLevel { unchanged: name })?;
                 continue;
             }
             if is_level_files(&split.mode)
@@ -408,10 +470,14 @@ impl Watch<'_> {
     /// Prints what is known of a level, and shows it on the page.
     fn note(&mut self, save: &mut Save, state: LevelState) -> Result<(), CliError> {
         if self.json {
-            let text = serde_json::to_string(&state);
-            print_line(text.map_err(|error| CliError::Io(format!("a verdict cannot be written as JSON: {error}")))?)?;
+            print_json(&state)?;
         } else {
             print_line(state.to_string())?;
+        }
+        let is_unseen = state.problem.is_none() && state.verdict.is_final && state.verdict.picture.is_none();
+        if is_unseen && self.page.is_some() && !self.no_picture_is_reported {
+            self.no_picture_is_reported = true;
+            report!("the page shows no pictures of levels: `{}` has no floor plan of them", self.game.name());
         }
         save.put(state);
         self.publish(save);
@@ -433,6 +499,11 @@ impl Watch<'_> {
         );
         Ok(Outcome::Stopped)
     }
+}
+
+fn print_json(value: &impl Serialize) -> Result<(), CliError> {
+    let text = serde_json::to_string(value);
+    print_line(text.map_err(|error| CliError::Io(format!("a verdict cannot be written as JSON: {error}")))?)
 }
 
 impl LevelState {

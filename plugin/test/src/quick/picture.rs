@@ -1,6 +1,6 @@
 //! The picture of a level with a path through it, or with the places that were not reached.
 
-use crate::verdict_report::{Block, Grid, HATCH, Reached, path, shape, stacked};
+use crate::verdict_report::{Grid, HATCH, Reached, floor as draw_floor, shape, start_and_goal};
 use bevy::math::{Rect, Vec2};
 use playbot_harness::floor_plan::FloorPlan;
 use std::fmt::Write;
@@ -23,26 +23,15 @@ pub(super) fn picture(floor: &FloorPlan, way: &[Vec2], lost: &[Vec2], reached: O
     if reached.is_some() {
         svg += HATCH;
     }
-    let blocks = |areas: &[Rect]| {
-        let finite = areas.iter().filter(|area| area.min.is_finite() && area.max.is_finite());
-        stacked(finite.filter_map(|area| grid.block(*area)).collect::<Vec<Block>>())
-    };
     svg += &reached.map_or_else(String::new, |reached| reached.svg(&grid, MOST_BYTES));
-    for (class, areas) in [("wall", &floor.walls), ("platform", &floor.platforms), ("hazard", &floor.hazards)] {
-        shape(class, None, &path(&blocks(areas)), &mut svg);
-    }
+    draw_floor(floor, &grid, &mut svg);
     for (class, positions) in [("way", way), ("way lost-way", lost)] {
         line(&grid, class, floor.start, positions, &mut svg);
     }
     if let Some([x, y]) = lost.last().and_then(|at| grid.place(*at)) {
         shape("mark", None, &format!("M{} {}l14 14m0-14l-14 14", x - 7, y - 7), &mut svg);
     }
-    if let Some([x, y]) = grid.place(floor.start) {
-        let _ = write!(svg, "<circle class=\"start\" cx=\"{x}\" cy=\"{y}\" r=\"7\"/>");
-    }
-    if let Some([x, y]) = grid.place(floor.goal) {
-        shape("goal", None, &format!("M{x} {}l9 9l-9 9l-9-9z", y - 9), &mut svg);
-    }
+    start_and_goal(floor, &grid, &mut svg);
     svg += "</svg>";
     Some(svg)
 }

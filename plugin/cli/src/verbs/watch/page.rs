@@ -14,7 +14,10 @@ use std::{
     collections::BTreeMap,
     io::{self, Write},
     net::TcpStream,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        mpsc::{self, Sender},
+    },
 };
 
 /// Style of this page, after that of reports.
@@ -35,9 +38,9 @@ pub(super) struct Page {
 #[derive(Default)]
 struct State {
     /// Each save as JSON, by its number.
-    saves: BTreeMap<u64, String>,
-    /// Browsers that listen.
-    listeners: Vec<TcpStream>,
+    saves: BTreeMap<u64, Arc<str>>,
+    /// Browsers that listen, each on a thread of its own: one that reads slowly keeps neither the watch nor others waiting.
+    listeners: Vec<Sender<Arc<str>>>,
 }
 
 impl Page {
@@ -78,7 +81,7 @@ impl Page {
     pub fn publish(&self, save: &Save) {
         let text = json(save);
         let mut state = lock(&self.state);
-        state.listeners.retain_mut(|listener| send(listener, "save", &text).is_ok());
+        state.listeners.retain(|listener| listener.send(Arc::clone(&text)).is_ok());
         state.saves.insert(save.number, text);
     }
 }
@@ -87,9 +90,9 @@ fn lock(state: &Mutex<State>) -> MutexGuard<'_, State> {
     state.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn json(save: &Save) -> String {
+fn json(save: &Save) -> Arc<str> {
     // The types have no maps with other keys than words, and no numbers that JSON lacks.
-    serde_json::to_string(save).unwrap_or_else(|_| "null".to_owned())
+    serde_json::to_string(save).unwrap_or_else(|_| "null".to_owned()).into()
 }
 
 /// Sends an event. Its data have no line break, as JSON has none.
@@ -97,14 +100,19 @@ fn send(listener: &mut TcpStream, event: &str, data: &str) -> io::Result<()> {
     listener.write_all(format!("event: {event}\ndata: {data}\n\n").as_bytes())
 }
 
-/// Sends all saves to a browser, and keeps it among those that hear of new ones.
+/// Sends all saves to a browser, and then each new one, until it has gone or reads too slowly.
 fn listen(answer: Answer, state: &Mutex<State>) -> io::Result<()> {
     let mut stream = answer.events()?;
-    let mut state = lock(state);
-    let all: Vec<&str> = state.saves.values().map(String::as_str).collect();
-    send(&mut stream, "all", &format!("[{}]", all.join(",")))?;
-    state.listeners.push(stream);
-    Ok(())
+    let (sender, fresh) = mpsc::channel();
+    let all = {
+        let mut state = lock(state);
+        // Under the same lock, so that no save is lost in between.
+        state.listeners.push(sender);
+        let all: Vec<&str> = state.saves.values().map(AsRef::as_ref).collect();
+        format!("[{}]", all.join(","))
+    };
+    send(&mut stream, "all", &all)?;
+    fresh.iter().try_for_each(|text| send(&mut stream, "save", &text))
 }
 
 #[cfg(test)]
@@ -160,5 +168,36 @@ mod tests {
             let data = lines.next().expect("its data");
             assert!(data.starts_with(&format!("data: {{\"number\":{number},")), "{data}");
         }
+    }
+
+    #[test]
+    fn a_browser_that_does_not_read_keeps_neither_the_watch_nor_others_waiting() {
+        let page = open();
+        let slow = ask(&page, "GET", "/events");
+        let mut lines = BufReader::new(ask(&page, "GET", "/events")).lines().map(|line| line.expect("a line"));
+        assert!(lines.any(|line| line == "event: all"));
+        // More than a connection holds.
+        let problem = "x".repeat(1 << 20);
+        for number in 2..34 {
+            page.publish(&Save { problem: Some(problem.clone()), ..Save::new(number) });
+        }
+        assert!(lines.any(|line| line.starts_with("data: {\"number\":33,")), "the other one hears of all");
+        drop(slow);
+    }
+
+    #[test]
+    fn the_legend_explains_what_is_drawn_alone() {
+        let drawn: Vec<String> = BODY
+            .split("data-of=\"")
+            .skip(1)
+            .filter_map(|rest| rest.split('"').next())
+            .map(|words| words.replace("&quot;", "\""))
+            .collect();
+        assert_eq!(drawn.len(), 8, "{drawn:?}");
+        let explained =
+            |svg: &str| drawn.iter().filter(|words| svg.contains(words.as_str())).cloned().collect::<Vec<String>>();
+        assert_eq!(explained("<path class=\"way\" d=\"M1 1\"/>"), ["class=\"way\""]);
+        assert_eq!(explained("<path class=\"way lost-way\" d=\"M1 1\"/>"), ["class=\"way lost-way\""]);
+        assert_eq!(explained("<circle class=\"start\" cx=\"1\"/>"), ["class=\"start\""]);
     }
 }

@@ -3,15 +3,18 @@
 
 use crate::{
     error::CliError,
+    output::program,
     verbs::watch::{GLANCE, changes::Stamp, saves::LevelState},
 };
-use playbot_harness::split::LevelSplit;
+use playbot_learner::{disk, write_atomically};
+use serde::{Deserialize, Serialize};
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    collections::BTreeMap,
     env, fs,
     io::{BufRead, BufReader, Read},
     path::{Path, PathBuf},
     process::{Child, Command, Stdio},
+    sync::mpsc::{self, RecvTimeoutError},
     thread,
 };
 
@@ -21,8 +24,14 @@ const MOST_FILES: usize = 20_000;
 /// Options of the watch itself, which a process that tests once does not take: with a value, or without.
 const OWN: [&str; 4] = ["--rebuild", "--code", "--assets", "--port"];
 
-/// The last letters of a build that failed.
+/// The last letters of a build or a test that failed.
 const MOST_LETTERS: usize = 2_000;
+
+/// Name of the file that names the layouts which a process need not test.
+const KNOWN: &str = "known.json";
+
+/// Looks for a Ctrl-C after a test has failed: the signal that ends a test may come to this process a little later.
+const LOOKS_FOR_STOP: u32 = 5;
 
 /// Files that levels depend on, and the command that builds the program.
 pub(super) struct Sources {
@@ -102,12 +111,12 @@ impl Sources {
         let text = [output.join().unwrap_or_default(), reader.join().unwrap_or_default()].concat();
         let text = String::from_utf8_lossy(&text).into_owned();
         match ended {
-            Some(true) => None,
-            Some(false) => {
-                let start = text.char_indices().rev().nth(MOST_LETTERS).map_or(0, |(place, _)| place);
-                Some(format!("`{command}` failed, and its levels are tested when it works:\n{}", text[start..].trim()))
+            ProcessEnd::Code(Some(0)) => None,
+            ProcessEnd::Code(_) => {
+                let words = last_letters(&text).trim();
+                Some(format!("`{command}` failed, and its levels are tested when it works:\n{words}"))
             }
-            None => Some(format!("`{command}` was stopped")),
+            ProcessEnd::Stopped => Some(format!("`{command}` was stopped")),
         }
     }
 }
@@ -129,76 +138,210 @@ fn add(path: &Path, found: &mut BTreeMap<PathBuf, Stamp>) {
     }
 }
 
-/// Waits for the end of a process. Returns whether it succeeded; `None` if it was stopped.
-fn end_of(child: &mut Child, stop: &dyn Fn() -> bool) -> Option<bool> {
+/// The end of a process.
+enum ProcessEnd {
+    /// Its exit code; `None` if it has none, as after a signal.
+    Code(Option<i32>),
+    /// It was stopped.
+    Stopped,
+}
+
+/// Waits for the end of a process.
+fn end_of(child: &mut Child, stop: &dyn Fn() -> bool) -> ProcessEnd {
     loop {
         match child.try_wait() {
-            Ok(Some(status)) => return Some(status.success()),
+            Ok(Some(status)) => return ProcessEnd::Code(status.code()),
             Ok(None) if stop() => {
-                // It is over either way.
-                let _ = child.kill();
-                let _ = child.wait();
-                return None;
+                end(child);
+                return ProcessEnd::Stopped;
             }
             Ok(None) => thread::park_timeout(GLANCE),
-            Err(_) => return Some(false),
+            Err(_) => return ProcessEnd::Code(None),
         }
     }
 }
 
-/// The command that tests a range of levels once.
+/// Ends a process, if it still runs.
+fn end(child: &mut Child) {
+    // It is over either way.
+    let _ = child.kill();
+    let _ = child.wait();
+}
+
+/// A process that ends with the value.
+struct Running(Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        end(&mut self.0);
+    }
+}
+
+/// Returns the last letters of a text.
+fn last_letters(text: &str) -> &str {
+    let start = text.char_indices().rev().nth(MOST_LETTERS).map_or(0, |(place, _)| place);
+    &text[start..]
+}
+
+/// Returns the lines of a pipe, as they come in.
+fn lines_of(pipe: impl Read) -> impl Iterator<Item = String> {
+    let lines = BufReader::new(pipe).split(b'\n').map_while(Result::ok);
+    lines.map(|line| String::from_utf8_lossy(&line).trim_end().to_owned())
+}
+
+/// Prints what a process says, and returns the last of it.
+fn last_words(pipe: impl Read) -> String {
+    let mut words = String::new();
+    for line in lines_of(pipe) {
+        report!("{line}");
+        words = format!("{}{line}\n", last_letters(&words));
+    }
+    words
+}
+
+/// A level that has the layout of its last test.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct UnchangedLevel {
+    /// Its name.
+    pub unchanged: String,
+}
+
+/// A line of a process that tests levels once for a watch.
+#[derive(Debug, PartialEq)]
+pub(super) enum LevelLine {
+    /// A level was tested.
+    Tested(Box<LevelState>),
+    /// A level was not tested.
+    Unchanged(UnchangedLevel),
+}
+
+impl LevelLine {
+    /// Reads a line of JSON. `None` if it is another one.
+    fn read(line: &str) -> Option<Self> {
+        let tested = serde_json::from_str(line).map(|state| Self::Tested(Box::new(state)));
+        tested.or_else(|_| serde_json::from_str(line).map(Self::Unchanged)).ok()
+    }
+}
+
+/// The end of a test by a process.
+#[derive(Debug, PartialEq)]
+pub(super) enum TestEnd {
+    /// All levels were tested, or are unchanged.
+    Done,
+    /// It failed: a sentence for people, with the last words of the process in the lines after it.
+    Failed(String),
+    /// It was stopped.
+    Stopped,
+}
+
+/// Reads the layouts that a watch knows, by the names of their levels.
+///
+/// # Errors
+///
+/// The file cannot be read, or is none of a watch.
+pub(super) fn read_layouts(path: &Path) -> Result<BTreeMap<String, String>, CliError> {
+    let text = fs::read_to_string(path).map_err(|error| error.to_string());
+    let layouts = text.and_then(|text| serde_json::from_str(&text).map_err(|error| error.to_string()));
+    layouts.map_err(|error| CliError::Usage(format!("{} is no list of layouts: {error}", path.display())))
+}
+
+/// The command that tests levels once.
 pub(super) struct Rebuilt {
+    program: PathBuf,
     options: Vec<String>,
     folder: PathBuf,
 }
 
 impl Rebuilt {
-    /// Takes the options that this program was called with.
-    pub fn new(split: &LevelSplit, folder: &Path) -> Self {
+    /// Takes the options that this program was called with. If these name no levels, the process tests those that its
+    /// game has then.
+    pub fn new(folder: &Path) -> Self {
         let mut options: Vec<String> = own_options(env::args().skip(1));
-        if !options.iter().any(|word| is_option(word, "--levels") || is_option(word, "--level")) {
-            options.extend(["--levels".to_owned(), split.to_string()]);
-        }
         options.retain(|word| word != "--json");
-        Self { options, folder: folder.to_owned() }
+        Self { program: program::file().unwrap_or_default(), options, folder: folder.to_owned() }
     }
 
-    /// Tests all levels but those of a known layout in a new process, and hands over what is found of each.
+    /// Tests all levels but those with the layout of their last test in a new process, and hands over its lines.
     ///
     /// # Errors
     ///
-    /// `each` failed. That the process fails is a line of its own for people.
+    /// `each` failed, or the disk refuses.
     pub fn test(
         &self,
-        known: &BTreeSet<String>,
+        known: &BTreeMap<String, String>,
         stop: &dyn Fn() -> bool,
-        each: &mut dyn FnMut(LevelState) -> Result<(), CliError>,
-    ) -> Result<(), CliError> {
-        let known: Vec<&str> = known.iter().map(String::as_str).collect();
-        let program = env::args_os().next().map(PathBuf::from).filter(|path| path.is_file());
-        let program = program.or_else(|| env::current_exe().ok()).unwrap_or_default();
-        let mut command = Command::new(&program);
-        command.args(&self.options).args(["--once", "--json", "--known", &known.join(",")]);
-        command.stdin(Stdio::null()).stdout(Stdio::piped());
-        let mut child = match command.spawn() {
-            Ok(child) => child,
+        each: &mut dyn FnMut(LevelLine) -> Result<(), CliError>,
+    ) -> Result<TestEnd, CliError> {
+        // A file, since an argument has at most 128 KiB on Linux.
+        let list = self.folder.join(KNOWN);
+        let text = serde_json::to_string(known).unwrap_or_else(|_| "{}".to_owned());
+        write_atomically(&list, text.as_bytes())
+            .map_err(|error| CliError::Io(format!("cannot write {}: {error}", list.display())))?;
+        let end = self.test_with(&list, stop, each);
+        // It is of no more use, and the next one replaces it.
+        let _ = disk::remove_file(&list);
+        end
+    }
+
+    /// Tests all levels but those of a file.
+    fn test_with(
+        &self,
+        known: &Path,
+        stop: &dyn Fn() -> bool,
+        each: &mut dyn FnMut(LevelLine) -> Result<(), CliError>,
+    ) -> Result<TestEnd, CliError> {
+        let program = self.program.display();
+        let mut command = Command::new(&self.program);
+        command.args(&self.options).args(["--once", "--json", "--known"]).arg(known);
+        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut running = match command.spawn() {
+            Ok(child) => Running(child),
             Err(error) => {
-                report!("{} does not start, and its levels are tested when it works: {error}", program.display());
-                return Ok(());
+                return Ok(TestEnd::Failed(format!(
+                    "{program} does not start, and its levels are tested at the next save: {error}"
+                )));
             }
         };
-        let Some(output) = child.stdout.take() else { return Ok(()) };
-        for line in BufReader::new(output).lines() {
-            let Ok(line) = line else { break };
-            match serde_json::from_str::<LevelState>(&line) {
-                Ok(state) => each(state)?,
-                Err(_) => report!("{line}"),
+        let errors = running.0.stderr.take().map(|pipe| thread::spawn(move || last_words(pipe)));
+        let (sender, lines) = mpsc::channel();
+        if let Some(pipe) = running.0.stdout.take() {
+            thread::spawn(move || lines_of(pipe).try_for_each(|line| sender.send(line)));
+        }
+        loop {
+            if stop() {
+                return Ok(self.stopped());
+            }
+            match lines.recv_timeout(GLANCE) {
+                Ok(line) => match LevelLine::read(&line) {
+                    Some(found) => each(found)?,
+                    None => report!("{line}"),
+                },
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => break,
             }
         }
-        if end_of(&mut child, stop).is_none() {
-            report!("the test was stopped; what it found is kept in {}", self.folder.display());
+        let code = match end_of(&mut running.0, stop) {
+            ProcessEnd::Stopped => return Ok(self.stopped()),
+            ProcessEnd::Code(Some(0 | 1)) => return Ok(TestEnd::Done),
+            ProcessEnd::Code(code) => code,
+        };
+        for _ in 0..LOOKS_FOR_STOP {
+            if stop() {
+                return Ok(self.stopped());
+            }
+            thread::park_timeout(GLANCE);
         }
-        Ok(())
+        let words = errors.and_then(|errors| errors.join().ok()).unwrap_or_default();
+        let code = code.map_or_else(|| "without an exit code".to_owned(), |code| format!("with exit code {code}"));
+        Ok(TestEnd::Failed(format!(
+            "{program} failed {code}, and its levels are tested at the next save:\n{}",
+            words.trim()
+        )))
+    }
+
+    fn stopped(&self) -> TestEnd {
+        report!("the test was stopped; its verdicts are kept in {}", self.folder.display());
+        TestEnd::Stopped
     }
 }
 
@@ -268,5 +411,52 @@ mod tests {
         let words = sources("echo 'error: no such thing' >&2; exit 1").rebuild(true, &|| false).expect("it failed");
         assert!(words.contains("failed") && words.ends_with("error: no such thing"), "{words}");
         assert!(sources("exec sleep 60").rebuild(true, &|| true).is_some_and(|words| words.contains("was stopped")));
+    }
+
+    #[test]
+    fn a_level_that_is_unchanged_is_told_from_one_that_was_tested() {
+        let unchanged = UnchangedLevel { unchanged: "easy:3 Cave".to_owned() };
+        let line = serde_json::to_string(&unchanged).expect("JSON");
+        assert_eq!(line, r#"{"unchanged":"easy:3 Cave"}"#);
+        assert_eq!(LevelLine::read(&line), Some(LevelLine::Unchanged(unchanged)));
+        let state = LevelState::unreadable("a", "half".to_owned());
+        let line = serde_json::to_string(&state).expect("JSON");
+        assert_eq!(LevelLine::read(&line), Some(LevelLine::Tested(Box::new(state))));
+        assert_eq!(LevelLine::read("a game may print here"), None);
+    }
+
+    /// Runs a shell's script instead of the program. Returns the end, and the lines.
+    #[cfg(unix)]
+    fn tested(script: &str, known: &BTreeMap<String, String>, stop: &dyn Fn() -> bool) -> (TestEnd, Vec<LevelLine>) {
+        let folder = tempfile::tempdir().expect("a folder");
+        let options = ["-c", script].map(str::to_owned).to_vec();
+        let rebuilt = Rebuilt { program: "sh".into(), options, folder: folder.path().to_owned() };
+        let mut lines = Vec::new();
+        let end = rebuilt.test(known, stop, &mut |line| {
+            lines.push(line);
+            Ok(())
+        });
+        assert!(!folder.path().join(KNOWN).exists(), "it is not needed any more");
+        (end.expect("writable"), lines)
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn a_process_gets_any_number_of_known_layouts_and_its_failure_is_reported_with_its_last_words() {
+        // As one argument they would be larger than Linux allows.
+        let known: BTreeMap<String, String> =
+            (0..20_000_u64).map(|level| (format!("easy:{level}"), format!("{level:016x}"))).collect();
+        // A shell counts the arguments from 0: --once, --json, --known, and the file.
+        let script = r#"grep -o '"easy:777":"[0-9a-f]*"' "$3" >&2; printf '{"unchanged":"easy:777"}\n'"#;
+        let (end, lines) = tested(&format!("{script}; exit 1"), &known, &|| false);
+        assert_eq!(end, TestEnd::Done, "exit code 1 is that of findings");
+        assert_eq!(lines, [LevelLine::Unchanged(UnchangedLevel { unchanged: "easy:777".to_owned() })]);
+        let (end, lines) = tested(&format!("{script}; echo 'half a file' >&2; exit 101"), &known, &|| false);
+        let TestEnd::Failed(words) = &end else { panic!("{end:?}") };
+        assert!(words.contains("failed with exit code 101") && words.ends_with("half a file"), "{words}");
+        assert!(words.contains(r#""easy:777":"0000000000000309""#) && lines.len() == 1, "{words}");
+        let (end, _) = tested("kill -KILL $$", &known, &|| false);
+        assert!(matches!(&end, TestEnd::Failed(words) if words.contains("without an exit code")), "{end:?}");
+        assert_eq!(tested("exec sleep 60", &known, &|| true).0, TestEnd::Stopped);
     }
 }

@@ -1,6 +1,6 @@
 //! The saves of a watch, and what was found after each: in memory, on disk, and in words.
 
-use crate::error::CliError;
+use crate::{error::CliError, output::make_folder};
 use playbot_learner::{disk, disk::DiskFile};
 use playbot_report::counted;
 use playbot_test::{quick::QuickVerdict, verdict::LevelOutcome};
@@ -103,6 +103,9 @@ impl LevelState {
     }
 }
 
+/// Warning about a level that every tester solves in its first tick.
+const AT_START: &str = "it is solved in its first tick: the agent may start at its goal";
+
 /// Returns the outcome as the page says it.
 fn in_words(outcome: LevelOutcome) -> &'static str {
     match outcome {
@@ -150,6 +153,9 @@ impl fmt::Display for LevelState {
         if verdict.lost > 0 {
             write!(f, "; {}", counted(verdict.lost, "death"))?;
         }
+        if verdict.solved_at_start {
+            write!(f, "; warning: {AT_START}")?;
+        }
         // A proof that there is no path is a finding, too, and is printed above.
         for finding in verdict.findings.iter().filter(|finding| verdict.why.as_ref() != Some(&finding.message)) {
             write!(f, "; {}: {}", finding.detector, finding.message)?;
@@ -177,7 +183,7 @@ impl Saves {
     pub fn open(folder: &Path, is_part: bool) -> Result<(Self, Option<String>), CliError> {
         let failed =
             |error: std::io::Error| CliError::Io(format!("cannot keep saves in {}: {error}", folder.display()));
-        disk::create_dir_all(folder).map_err(failed)?;
+        make_folder(folder)?;
         let lock = if is_part { None } else { Some(lock(folder)?) };
         let file = folder.join(SAVES);
         let text = if file.is_file() { std::fs::read_to_string(&file).map_err(failed)? } else { String::new() };
@@ -355,6 +361,11 @@ mod tests {
         let words = "a.json: NOT SOLVED, NOTHING PROVED (before: solved); the stored solution is lost after 40 ticks; 2 deaths \
                      [0.25 s]";
         assert_eq!(lost.to_string(), words);
+        let mut early = state("a.json", LevelOutcome::Solved, Some(1));
+        early.verdict.solved_at_start = true;
+        let words = "a.json: solved in 1 tick by search; warning: it is solved in its first tick: the agent may start at its \
+                     goal [0.25 s]";
+        assert_eq!(early.to_string(), words);
         let unreadable = LevelState::unreadable("b.json", "line 3: no rows".to_owned());
         assert_eq!(unreadable.to_string(), "b.json: NOT TESTED: line 3: no rows");
     }

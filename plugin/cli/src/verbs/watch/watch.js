@@ -66,6 +66,7 @@
       const since = before && before.lost !== verdict.lost ? ` (${signed(verdict.lost - before.lost)})` : "";
       words.push(`${plural(verdict.lost, "death")}${since}`);
     }
+    if (verdict.solved_at_start) words.push("it is solved in its first tick: the agent may start at its goal");
     const text = words.join("; ");
     return text === "" ? "" : `${text[0].toUpperCase()}${text.slice(1)}.`;
   };
@@ -122,7 +123,7 @@
       const time = new Date(one.at).toLocaleTimeString();
       const what = one.problem ? "problem" : [...one.levels.map((state) => state.level), ...(one.gone ?? []).map((level) => `${level} gone`)];
       const gone = one.gone?.length > 0 && one.levels.length === 0 ? " gone" : "";
-      const small = Array.isArray(what) ? (what.length > 2 ? `${plural(what.length, "level")}${gone}` : what.join(", ")) : what;
+      const small = Array.isArray(what) ? (what.length === 0 ? "as before" : what.length > 2 ? `${plural(what.length, "level")}${gone}` : what.join(", ")) : what;
       const [entry, button] = item(`${one.number}, ${time}`, small, one.number === last, () => {
         shownSave = one.number === newest() ? null : one.number;
         shownLevel = worst(one)?.level ?? shownLevel;
