@@ -73,3 +73,16 @@ fn copies_of_a_file_and_of_a_numbered_level_are_found() {
     let (_, words) = done(folder, &["test", "coinrun", "--levels", "files:*.json", "--bot", "search", "--out", "t"]);
     assert!(words.contains("2 levels have 1 layout"), "{words}");
 }
+
+#[test]
+fn a_level_that_is_solved_in_its_first_tick_has_a_warning_while_it_is_drawn() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    fs::write(folder.join("beside.json"), json!({"rows": ["####", "#.C#"]}).to_string()).expect("writable");
+    let (far, _) = done(folder, &["level", "coinrun", "--mode", "easy", "--level", "3", "--json"]);
+    fs::write(folder.join("far.json"), far).expect("writable");
+    let (words, _) = done(folder, &["watch", "coinrun", "--levels", "files:*.json", "--once"]);
+    let warned: Vec<&str> =
+        words.lines().filter(|line| line.contains("warning: it is solved in its first tick")).collect();
+    assert!(warned.len() == 1 && warned[0].starts_with("beside.json: solved in 1 tick by search; "), "{words}");
+}

@@ -87,6 +87,13 @@ fn a_test_does_not_count_levels_whose_findings_are_pinned() {
     review(folder, &[], "i\np\nnew level is drawn\n2099-01-31\n");
     let words = test(folder, &["--force"], 1);
     assert!(words.contains("1 pinned finding; levels with nothing else wrong, which do not count: 1"), "{words}");
+    for file in ["summary.md", "report.html"] {
+        let page = fs::read_to_string(folder.join("out").join(file)).expect("written");
+        assert!(page.contains("pinned until 2099-01-31: new level is drawn"), "{file}: {page}");
+    }
+    let page = fs::read_to_string(folder.join("out/report.html")).expect("written");
+    assert!(page.contains("A failed episode of random is kept: "), "{page}");
+    assert!(page.contains("playbot replay findings/open-json.not-solved."), "{page}");
     review(folder, &[], "p\nthe limit is short\n\n");
     let words = test(folder, &["--force"], 0);
     assert!(words.contains("2 pinned findings; levels with nothing else wrong, which do not count: 2"), "{words}");
@@ -137,7 +144,7 @@ fn what_cannot_be_reviewed_is_said() {
         assert!(reported.contains(words), "{args:?}: {reported}");
     }
     tested(folder);
-    // Nobody can answer: neither a terminal nor letters.
+    // There are no answers: the input is no terminal, and is empty.
     let output = review(folder, &[], "");
     assert!(code(&output) == 3 && errors(&output).contains("standard input has no letters"), "{}", errors(&output));
     let output = review(folder, &["--regressions", "out/findings"], "k\n");

@@ -291,6 +291,40 @@ fn places_that_other_testers_visited_are_not_compared_and_the_program_says_so() 
     assert!(!words.contains("not compared"), "{words}");
 }
 
+#[test]
+fn levels_that_lost_their_only_solver_are_not_compared_and_the_testers_are_named() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    let run = |out: &str, rest: &[&str], wanted: i32| {
+        let output = test(folder, out, &[&["--levels", "easy:0..3"], rest].concat());
+        assert_eq!(code(&output), wanted, "{}", errors(&output));
+        errors(&output)
+    };
+    run("before", &["--bot", "search,random"], 0);
+    let words = run("after", &["--bot", "right-jump,random", "--against", "before"], 0);
+    for tester in ["the tester `search` is not there now", "the tester `right-jump` was not there before"] {
+        assert!(words.contains(&format!("left out of the comparison: {tester}\n")), "{words}");
+    }
+    let unsolved = results(folder, "after");
+    let unsolved = unsolved["levels"].as_array().expect("levels").iter().filter(|level| level["outcome"] != "solved");
+    let unsolved: Vec<&str> = unsolved.filter_map(|level| level["level"].as_str()).collect();
+    let against: Value = serde_json::from_str(&read(folder, "after/against.json")).expect("JSON");
+    let others = against["other_testers"].as_array().expect("levels");
+    let lost: Vec<&str> =
+        others.iter().filter(|level| level["before"] == true).filter_map(|level| level["level"].as_str()).collect();
+    assert!(lost.contains(&"easy:0") && lost.iter().all(|level| unsolved.contains(level)), "{against}");
+    assert!(
+        words.contains("cannot be compared, since the testers differ and only those of one test solved "),
+        "{words}"
+    );
+    assert!(!words.contains("nothing has changed"), "{words}");
+    // The levels that the table calls unsolved.
+    assert!(words.contains(&format!("before: search, random): {} unsolved level", unsolved.len())), "{words}");
+    let page = read(folder, "after/report.html");
+    assert!(page.contains("solved before by search alone, and the testers differ"), "{page}");
+    assert!(read(folder, "after/summary.md").contains("\nNot comparable ("));
+}
+
 /// Writes a recording in which the episodes of a level are longer by one tick, as if the present game ended them too
 /// early.
 fn delay(from: &Path, to: &Path, level: u64) {

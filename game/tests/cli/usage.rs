@@ -189,6 +189,42 @@ fn a_window_that_cannot_open_is_refused_before_anything_is_recorded() {
 }
 
 #[test]
+fn a_file_where_a_folder_is_wanted_is_left_alone() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("taken");
+    std::fs::write(&file, "in the way").expect("writable");
+    for args in [
+        &["test", "coinrun", "--levels", "easy:0..0", "--out", "taken"][..],
+        &["test", "coinrun", "--levels", "easy:0..0", "--out", "taken", "--force"],
+        &["watch", "coinrun", "--levels", "easy:0..0", "--once", "--out", "taken"],
+    ] {
+        let output = playbot(folder.path(), args);
+        assert_eq!(code(&output), 3, "{args:?}: {}", errors(&output));
+        let words = "taken is a file: name a folder to write into";
+        assert!(errors(&output).contains(words), "{args:?}: {}", errors(&output));
+    }
+    assert_eq!(std::fs::read_to_string(file).expect("kept"), "in the way");
+}
+
+#[test]
+fn a_level_replaces_a_file_with_force_only() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("new/a.json");
+    let level = |level: &str, more: &[&str], wanted: i32| {
+        let args = ["level", "coinrun", "--level", level, "--json", "--out", "new/a.json"];
+        let output = playbot(folder.path(), &[&args[..], more].concat());
+        assert_eq!(code(&output), wanted, "{}", errors(&output));
+        (errors(&output), std::fs::read_to_string(&file).expect("it is there"))
+    };
+    let (_, first) = level("1", &[], 0);
+    let (words, kept) = level("2", &[], 3);
+    assert!(words.contains("new/a.json exists: name another file, or overwrite it with --force"), "{words}");
+    assert_eq!(kept, first);
+    let (_, second) = level("2", &["--force"], 0);
+    assert_ne!(second, first);
+}
+
+#[test]
 fn a_shell_gets_the_verbs_that_it_completes() {
     let folder = tempfile::tempdir().expect("a folder");
     let printed = playbot(folder.path(), &["completions", "bash"]);

@@ -1,4 +1,6 @@
-//! Text that is safe in HTML, in SVG and on a terminal.
+//! Text that is safe in HTML, in SVG, in addresses and on a terminal, and pictures as text.
+
+use std::fmt::Write;
 
 /// Returns whether a character is invisible and changes how others are shown: a control character, or one that changes
 /// the direction of writing.
@@ -28,6 +30,24 @@ pub fn escape(text: &str) -> String {
     out
 }
 
+/// Returns a path as a URI reference (RFC 3986): all but letters, digits, `-._~` and `/` is escaped.
+///
+/// ```
+/// assert_eq!(playbot_report::escape::uri_path("my levels/ü.json"), "my%20levels/%C3%BC.json");
+/// ```
+pub fn uri_path(path: &str) -> String {
+    let mut out = String::with_capacity(path.len());
+    for byte in path.bytes() {
+        if byte.is_ascii_alphanumeric() || b"-._~/".contains(&byte) {
+            out.push(char::from(byte));
+        } else {
+            // Writing into a string cannot fail.
+            let _ = write!(out, "%{byte:02X}");
+        }
+    }
+    out
+}
+
 /// Returns text on one line without control characters and those that change the direction of writing, so that it
 /// cannot control a terminal.
 pub(crate) fn one_line(text: &str) -> String {
@@ -50,6 +70,26 @@ pub(crate) fn with_code_spans(text: &str) -> String {
     }
     out.push_str(&escape(rest));
     out
+}
+
+/// The letters of Base64.
+const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+
+/// Encodes bytes in Base64 with padding (RFC 4648).
+///
+/// ```
+/// assert_eq!(playbot_report::base64(b"foob"), "Zm9vYg==");
+/// ```
+pub fn base64(bytes: &[u8]) -> String {
+    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for three in bytes.chunks(3) {
+        let bits = three.iter().fold(0_usize, |bits, byte| (bits << 8) | usize::from(*byte)) << (8 * (3 - three.len()));
+        for place in 0..4 {
+            let letter = LETTERS[(bits >> (18 - 6 * place)) & 63];
+            text.push(if place <= three.len() { char::from(letter) } else { '=' });
+        }
+    }
+    text
 }
 
 #[cfg(test)]
@@ -80,5 +120,15 @@ mod tests {
     fn code_spans() {
         assert_eq!(with_code_spans("run `a<b` now"), "run <code>a&lt;b</code> now");
         assert_eq!(with_code_spans("a ` b & c"), "a ` b &amp; c");
+    }
+
+    #[test]
+    fn base64_is_that_of_the_standard() {
+        // The examples of RFC 4648.
+        let coded = ["", "Zg==", "Zm8=", "Zm9v", "Zm9vYg==", "Zm9vYmE=", "Zm9vYmFy"];
+        for (length, expected) in coded.iter().enumerate() {
+            assert_eq!(base64(&b"foobar"[..length]), *expected);
+        }
+        assert_eq!(base64(&[0xfb, 0xff]), "+/8=");
     }
 }

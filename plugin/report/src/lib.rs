@@ -9,8 +9,7 @@
 //! - [`chart`]: the data of line charts. [`to_svg`] draws [`Chart`]s, [`sparkline`] a curve in one line of text.
 //! - [`Report`]: text, tables and charts in one HTML file that loads nothing: no scripts, no fonts, no network. It
 //!   follows the reader's light or dark setting and prints.
-//! - [`base64()`]: pictures as text.
-//! - [`mod@escape`]: text that is safe in HTML, in SVG and on a terminal.
+//! - [`mod@escape`]: text that is safe in HTML, in SVG and on a terminal, and [`base64()`] for pictures as text.
 //!
 //! ```
 //! use playbot_report::{percent, sparkline, statistics::median};
@@ -20,7 +19,6 @@
 //! assert_eq!(median(solved).map(percent).as_deref(), Some("50.0 %"));
 //! ```
 
-mod base64;
 pub mod chart;
 mod document;
 pub mod escape;
@@ -34,9 +32,9 @@ mod tests;
 pub mod text_table;
 
 pub use crate::{
-    base64::base64,
     chart::{Chart, Curve, sparkline},
     document::{Report, ReportError, Section, markdown_cell, markdown_row},
+    escape::base64,
     number::{counted, percent, readable, readable_with_spread, ticks, times, whole},
     results::{ResultRow, ResultTable},
     statistics::PairedDifference,

@@ -17,6 +17,7 @@
 //! - `walked`, [`maps`]: the walks of a level, as maps.
 //! - `folder`, `results`, [`mod@merge`], `shard`: the folder of a test and its `results.json`, and parts of a test.
 //! - `compare`, `statistics`: the comparison with earlier results.
+//! - `pinned`: findings that do not count for a while.
 //! - `reports`, `error`: reports, and errors.
 
 mod compare;
@@ -24,6 +25,7 @@ mod error;
 mod folder;
 pub mod maps;
 pub mod merge;
+mod pinned;
 mod plan;
 mod played;
 mod reports;
@@ -48,7 +50,7 @@ use crate::{
     },
 };
 use bevy::math::{Rect, Vec2};
-use bevy_playbot::episode::EpisodeEnd;
+use bevy_playbot::{episode::EpisodeEnd, skill_prior::NamedSkill};
 use playbot_harness::{
     detector::LevelProof,
     game::{Game, prove_level},
@@ -63,13 +65,17 @@ use std::{
 };
 
 pub use crate::verdict::{
-    compare::{Change, Comparison, EarlierTest, FALSE_DISCOVERY_RATE, FindingChange, RecordedWins, UnreachedSquares},
+    compare::{
+        Change, Comparison, EarlierTest, FALSE_DISCOVERY_RATE, FindingChange, RecordedWins, SolvedByOthers,
+        UnreachedSquares,
+    },
     error::TestError,
     folder::{Earlier, TestFolder},
     maps::{
         EpisodePath, LevelMaps, LevelPars, MapScope, PlanRows, SkillTicks, TesterEvents, hash_of_files, level_name,
     },
     merge::merge,
+    pinned::PinnedFindings,
     plan::{TestPlan, TestRecord, TestedRun, Tester, TesterRecord},
     reports::{
         AGAINST, JUNIT, SUMMARY, action_search, comparable_command,
@@ -417,7 +423,8 @@ fn judge(
     if let Some(floor) = floor {
         verdict.ends = end_places(floor.bounds, &failed);
         let names: Vec<&str> = plan.testers.iter().map(|tester| tester.record.name.as_str()).collect();
-        let walked = has_maps.then(|| LevelVisits::of(&floor, &names, played, &verdict.findings)).flatten();
+        let regions: Vec<&[NamedSkill]> = plan.testers.iter().map(|tester| tester.record.regions()).collect();
+        let walked = has_maps.then(|| LevelVisits::of(&floor, &names, &regions, played, &verdict.findings)).flatten();
         if let Some(walked) = walked {
             verdict.places = walked.places;
             verdict.maps = Some(walked.maps);

@@ -12,7 +12,8 @@
 //!
 //! - `selection`: the levels of the page, the worst ones first.
 //! - `gallery`: all levels as small pictures.
-//! - `cards`: findings as the game shows them.
+//! - `cards`: findings as the game shows them, with the path up to each on the plan, around the tick
+//!   since which something is wrong.
 //! - `pairs`: changed levels, before and now.
 //! - `events`: events of all levels of one size, as layers.
 //! - `level_table`: the table of levels.
@@ -45,7 +46,7 @@ use crate::{
     },
     verdict_report::{
         cards::cards,
-        drawn::{Drawings, Plans},
+        drawn::{Drawings, MOST_PICTURES, Plans},
         events::Events,
         files::PictureFiles,
         gallery::gallery,
@@ -58,18 +59,18 @@ use playbot_harness::game::Game;
 use playbot_report::{PAGE_STYLE, counted, escape::escape, whole};
 use std::{
     cmp::Reverse,
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     fmt::{Display, Write},
     path::Path,
 };
 
 pub use crate::verdict_report::{
-    cards::{FindingScene, GameLogLine, SceneTick, Scenes},
+    cards::{FindingScene, GameLogLine, SceneFilm, SceneTick, Scenes, tick_since},
     files::folder_of,
     reach::LevelExplorer,
 };
 pub(crate) use crate::verdict_report::{
-    heat::{Block, Grid, path, shape, stacked},
+    heat::{Grid, floor, shape, start_and_goal},
     reach::{HATCH, Reached},
 };
 
@@ -122,10 +123,16 @@ pub fn html(results: &Path, report: &HtmlReport) -> Result<String, TestError> {
 fn html_with(results: &Path, report: &HtmlReport, files: PictureFiles) -> Result<(String, PictureFiles), TestError> {
     let overview = Overview::read(results)?;
     let mut events = Events::new(&overview.record);
-    let selection = Selection::read(results, &mut |level| events.add(level))?;
+    let mut selection = Selection::read(results, &mut |level| events.add(level))?;
     let plans = Plans::of(report.game, &overview.record);
     let ticks = overview.time.map_or(0.0, |time| time.as_secs_f64() * plans.tick_hz().unwrap_or(0.0));
     let drawings = Drawings::new(plans, files, report.explorer, ticks as u64);
+    let drawn: BTreeSet<u64> = selection.levels.iter().take(MOST_PICTURES).map(|level| level.index).collect();
+    selection.order_by_reach(&|level| {
+        // Others have no picture, for which their squares would be found out.
+        let plan = if drawn.contains(&level.index) { drawings.plans.get(level)? } else { return None };
+        Some(drawings.reached(level, &plan)?.share())
+    });
     let pairs = match (report.comparison, report.before) {
         (Some(comparison), Some(before)) => pairs(before, results, comparison, &drawings)?,
         _ => String::new(),
@@ -317,9 +324,10 @@ pub(crate) fn compared(comparison: &Comparison, record: &TestRecord, program: &s
         list("No longer reached", &comparison.unreached, AGAINST),
     ];
     if lists.iter().all(String::is_empty) {
-        out += "<p>Nothing has changed by more than chance.</p>\n";
+        let _ = writeln!(out, "<p>{}</p>", comparison.no_change_sentence());
     }
-    out + &lists.concat() + "</section>\n"
+    let others = list("Not comparable", &comparison.other_testers, AGAINST);
+    out + &lists.concat() + &others + "</section>\n"
 }
 
 /// Writes the section about a recording; empty without one.

@@ -3,7 +3,7 @@
 use crate::{
     arguments::{LevelsArg, default_mode, experiment::quoted},
     error::{CliError, Outcome},
-    output::{print_or_write, program},
+    output::{prepare, print_or_replace, program},
     pictures::{plot, plot::PlotFile},
 };
 use playbot_harness::{
@@ -13,7 +13,7 @@ use playbot_harness::{
     level_files::is_level_files,
 };
 use playbot_learner::ActionSpace;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Show a level: its layout, or what is known of it without playing it.
 ///
@@ -58,9 +58,12 @@ pub struct Args {
     /// Print one line of JSON instead of a picture.
     #[arg(long)]
     json: bool,
-    /// File to write it to instead of standard output. It must not exist.
+    /// File to write it to instead of standard output.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Overwrite an existing file.
+    #[arg(long, requires = "out")]
+    force: bool,
     /// Also draw the whole level into this .png (maps also into a .svg).
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
@@ -68,17 +71,27 @@ pub struct Args {
 
 pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
+    args.out.as_deref().map(|out| check_out(out, args.force)).transpose()?;
     let file = args.png.as_deref().map(PlotFile::new).transpose()?;
     let level = show(game, &args, file.is_some())?;
     if let (Some(file), Some(picture)) = (file, &level.picture) {
         plot::write(&file, picture, game.tick_hz())?;
         report!("picture: {}", file.path().display());
     }
-    print_or_write(if args.json { &level.json } else { &level.text }, args.out.as_deref())?;
+    print_or_replace(if args.json { &level.json } else { &level.text }, args.out.as_deref())?;
     if level.lacks_plan {
         instead(game, &args).iter().for_each(|advice| report!("{advice}"));
     }
     Ok(Outcome::Pass)
+}
+
+/// Checks that the level can be written to a file, before another one is.
+fn check_out(out: &Path, force: bool) -> Result<(), CliError> {
+    if out.is_file() && !force {
+        let out = out.display();
+        return Err(CliError::Usage(format!("{out} exists: name another file, or overwrite it with --force")));
+    }
+    prepare(out)
 }
 
 /// Returns the commands that show a level without a plan. A level from standard input cannot be named in them.

@@ -182,7 +182,8 @@ pub(crate) fn run_html(args: &HtmlArgs, games: &Games) -> Result<Outcome, CliErr
 /// List what is wrong with the levels of results, in a form that build servers and editors read.
 ///
 /// Each finding is an issue, and each level that no tester solved and that has none. Levels of files are annotated at their
-/// file. `github` prints commands of a workflow, which annotate the files of a pull request.
+/// file. `github` prints commands of a workflow, which annotate the files of a pull request. A pinned finding has the lowest
+/// severity, with the reason of its pin.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot report issues runs/test --form github

@@ -417,8 +417,7 @@ fn open(path: &Path) {
 /// Plays a finding in a window of another process: a process opens one window only.
 #[cfg(feature = "window")]
 fn open(path: &Path) {
-    let own = env::args_os().next().map(PathBuf::from).filter(|program| program.is_file());
-    let Some(own) = own.or_else(|| env::current_exe().ok()) else {
+    let Ok(own) = program::file() else {
         return report!("call `{} replay {} --window`", program::name(), word(path));
     };
     let mut replay = Command::new(own);

@@ -17,6 +17,7 @@ use crate::{
         Compute, check_start_and_steps, default_tested, experiment::quoted, named_or_only, report_agents_along,
     },
     error::{CliError, Outcome},
+    output::check_folder,
     progress,
     progress::interrupt,
     verbs::{
@@ -138,6 +139,7 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
         let name = game.name();
         return Err(CliError::Usage(format!("name a folder for the results with --out, such as --out runs/{name}")));
     };
+    check_folder(out)?;
     report_agents_along(game);
     let plan = plan(args, game)?;
     let record = plan.record(game);
@@ -185,7 +187,7 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     };
     folder.finish_against(&courses)?;
     let outcome = report_results(&results)?;
-    args.history.as_deref().map(|file| add_results(file, out, args.build.as_deref())).transpose()?;
+    args.history.as_deref().map(|file| add_results(file, out, game, args.build.as_deref())).transpose()?;
     report_off(game, &plan.detectors);
     Ok(outcome)
 }

@@ -7,13 +7,7 @@ use crate::{
         play::{CheckTick, Replayed, Watcher, say_the_same},
     },
 };
-use bevy_playbot::{
-    action::Action,
-    episode::{Episode, EpisodeEnd, EpisodeResult},
-    observation::Observation,
-    reward::Reward,
-    state_hash::StateHash,
-};
+use bevy_playbot::episode::{EpisodeEnd, EpisodeResult};
 use playbot_harness::{
     detector,
     detector::{Detector, EpisodeWatcher, LevelAhead, WorldTick, WorldWatcher},
@@ -199,24 +193,17 @@ impl Looking {
     /// Examines a tick. Returns a message if something is wrong.
     pub fn look(&mut self, moment: &CheckTick) -> Option<String> {
         let CheckTick { game, mode, world, agent, tick, end, errors } = *moment;
-        let (episode, action) = (world.get::<Episode>(agent)?, world.get::<Action>(agent)?);
-        let level = episode.level;
+        let seen = detector::DetectorTick::of_agent(world, agent, tick)?;
+        let level = seen.level;
         let ahead = || LevelAhead { level, plan: game.tools().levels.floor_plan(mode, level) };
         let watch = self.begun.get_or_insert_with(|| self.detector.watch(&ahead()));
         let proofs = GameProofs { game, mode, level, world, agent };
         let seen = detector::DetectorTick {
-            world,
-            agent,
-            level,
-            tick,
-            action: &action.0,
-            observation: world.get::<Observation>(agent).map_or(&[][..], |seen| seen.vector.as_slice()),
-            state_hash: world.get::<StateHash>(agent).map_or(0, |hash| hash.0),
-            reward: world.get::<Reward>(agent).map_or(0.0, Reward::get),
             position: game.tools().state.position(world, agent),
             height: game.tools().state.height(world, agent),
-            is_success: end.map_or_else(|| episode.is_success(), |end| end.success),
+            is_success: end.map_or(seen.is_success, |end| end.success),
             proofs: &proofs,
+            ..seen
         };
         let in_episode = watch.as_mut().and_then(|watch| {
             let now = watch.tick(&seen);

@@ -48,13 +48,39 @@ pub enum HistoryError {
         /// The game to add.
         here: String,
     },
+    /// Builds of two games.
+    #[error(
+        "{} has results of `{}`, and {} of `{}`: name results of one game", one.1, one.0, other.1, other.0
+    )]
+    TwoGames {
+        /// One game, and a build of it.
+        one: (String, String),
+        /// The other one.
+        other: (String, String),
+    },
+}
+
+/// Checks that all builds are of one game.
+///
+/// # Errors
+///
+/// Two of them are of different games.
+pub fn check_one_game(history: &History) -> Result<(), HistoryError> {
+    let Some(first) = history.builds.first() else { return Ok(()) };
+    match history.builds.iter().find(|build| build.game != first.game) {
+        Some(other) => {
+            let [one, other] = [first, other].map(|build| (build.game.clone(), build.build.clone()));
+            Err(HistoryError::TwoGames { one, other })
+        }
+        None => Ok(()),
+    }
 }
 
 impl HasExitCode for HistoryError {
     fn exit_code(&self) -> u8 {
         match self {
             Self::Io { .. } => 2,
-            Self::NoHistory(_) | Self::Newer { .. } | Self::OtherGame { .. } => 3,
+            Self::NoHistory(_) | Self::Newer { .. } | Self::OtherGame { .. } | Self::TwoGames { .. } => 3,
         }
     }
 }
@@ -180,6 +206,10 @@ mod tests {
         let other = Build { game: "maze".to_owned(), ..history.builds[0].clone() };
         let error = add(&path, &other).expect_err("another game").to_string();
         assert!(error.contains("is the history of `garden`, not of `maze`"), "{error}");
+        let mut both = history;
+        both.builds[7] = other;
+        let error = check_one_game(&both).expect_err("two games").to_string();
+        assert_eq!(error, "b00 has results of `garden`, and b00 of `maze`: name results of one game");
         assert!(matches!(read(folder.path()), Err(HistoryError::Io { .. })));
     }
 }

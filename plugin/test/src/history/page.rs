@@ -1,4 +1,4 @@
-//! The page of a history: each level that is not always sound, with a square for each build.
+//! The page of a history: each level with a square for each build, those that are always sound in a fold.
 
 use crate::{
     history::{Course, History, LevelCourse},
@@ -36,6 +36,7 @@ pub fn page(history: &History) -> String {
     for (name, words, class) in [
         ("broken", "broken", "proved-unsolvable"),
         ("flaky", "flaky", "bot-failed"),
+        ("other-testers", "not comparable", "bot-failed"),
         ("never-sound", "never sound", "bot-failed"),
         ("mended", "mended", "solved"),
         ("sound", "always sound", "solved"),
@@ -44,33 +45,50 @@ pub fn page(history: &History) -> String {
         let _ = writeln!(numbers, "<div><dt>{words}</dt><dd class=\"{class}\">{count}</dd></div>");
     }
     numbers += "</dl>\n";
-    let shown: Vec<&LevelCourse> =
-        courses.iter().filter(|course| course.course != Course::Sound).take(MOST_ROWS).collect();
-    let mut rows = String::new();
-    for course in &shown {
-        rows += &row(history, course);
+    for change in history.changes_of_testers() {
+        let _ = writeln!(numbers, "<p>The testers changed in {}.</p>", text(&change));
     }
-    let table = if shown.is_empty() {
+    let (sound, unsound): (Vec<&LevelCourse>, Vec<&LevelCourse>) =
+        courses.iter().partition(|course| course.course == Course::Sound);
+    let mut tables = if unsound.is_empty() {
         "<p>Every level was sound in every build.</p>\n".to_owned()
     } else {
-        format!(
-            "<p>A square for each build, from the oldest to the newest. Lines: median ticks of the solved episodes, and visited \
-             squares.</p>\n<div class=\"levels\" role=\"region\" aria-label=\"Levels\" tabindex=\"0\"><table>\n<thead><tr><th \
-             scope=\"col\">level</th><th scope=\"col\">course</th><th scope=\"col\">builds</th><th scope=\"col\">ticks</th>\
-             <th scope=\"col\">visited</th><th scope=\"col\">findings</th></tr></thead>\n<tbody>\n{rows}</tbody></table></div>\n"
-        )
+        format!("<p>{KEY}</p>\n{}", table(history, &unsound))
     };
+    if !sound.is_empty() {
+        let key = if unsound.is_empty() { format!("<p>{KEY}</p>\n") } else { String::new() };
+        let count = counted(sound.len() as u64, "level");
+        let table = table(history, &sound);
+        let _ = writeln!(tables, "<details><summary>{count} always sound</summary>\n{key}{table}</details>");
+    }
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
          content=\"width=device-width, initial-scale=1\">\n<meta name=\"color-scheme\" content=\"light dark\">\n\
          <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\">\n\
          <title>{title}</title>\n<style>\n{PAGE_STYLE}{STYLE}{OWN_STYLE}</style>\n</head>\n<body>\n<main>\n<header>\n\
-         <h1>{title}</h1>\n<p class=\"subtitle\">{subtitle}</p>\n</header>\n{numbers}{table}</main>\n</body>\n</html>\n"
+         <h1>{title}</h1>\n<p class=\"subtitle\">{subtitle}</p>\n</header>\n{numbers}{tables}</main>\n</body>\n</html>\n"
+    )
+}
+
+/// Explains a table.
+const KEY: &str = "A square for each build, from the oldest to the newest. Lines: median ticks of the solved episodes, and visited \
+                   squares. Solved by: testers, in the last build with the level.";
+
+/// Writes the first of these levels as a table.
+fn table(history: &History, courses: &[&LevelCourse]) -> String {
+    let rows: String = courses.iter().take(MOST_ROWS).map(|course| row(history, course)).collect();
+    let more = courses.len().saturating_sub(MOST_ROWS);
+    let more = if more > 0 { format!("<p>And {}.</p>\n", counted(more as u64, "other level")) } else { String::new() };
+    format!(
+        "<div class=\"levels\" role=\"region\" aria-label=\"Levels\" tabindex=\"0\"><table>\n<thead><tr><th \
+         scope=\"col\">level</th><th scope=\"col\">course</th><th scope=\"col\">builds</th><th scope=\"col\">ticks</th>\
+         <th scope=\"col\">visited</th><th scope=\"col\">solved by</th><th scope=\"col\">findings</th></tr></thead>\n\
+         <tbody>\n{rows}</tbody></table></div>\n{more}"
     )
 }
 
 fn row(history: &History, course: &LevelCourse) -> String {
-    let LevelCourse { level, course: what, findings, ticks, visited, outcomes, .. } = course;
+    let LevelCourse { level, course: what, findings, ticks, visited, outcomes, solved_by } = course;
     let found: Vec<String> = findings
         .iter()
         .map(|finding| {
@@ -78,8 +96,9 @@ fn row(history: &History, course: &LevelCourse) -> String {
             format!("{} from {} {until}", text(&finding.finding), text(&finding.first))
         })
         .collect();
+    let solved_by = if solved_by.is_empty() { "–".to_owned() } else { text(&solved_by.join(", ")) };
     format!(
-        "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+        "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{solved_by}</td><td>{}</td></tr>\n",
         text(level),
         text(&what.to_string()),
         strip(history, outcomes),
@@ -140,9 +159,12 @@ mod tests {
     use crate::history::tests::thirty_builds;
 
     #[test]
-    fn the_page_has_a_row_for_each_level_that_is_not_always_sound() {
+    fn the_page_has_a_row_for_each_level_and_those_that_are_always_sound_are_in_a_fold() {
         let (history, broken, flaky) = thirty_builds();
         let html = page(&history);
+        let (html, fold) = html.split_once("<details><summary>30 levels always sound</summary>").expect("a fold");
+        assert_eq!(fold.matches("<th scope=\"row\">").count(), 30);
+        assert_eq!(fold.matches("<rect ").count(), 30 * history.builds.len(), "a square for each level and build");
         for (level, since) in &broken {
             assert!(html.contains(&format!("<th scope=\"row\">{level}</th><td>broken since {since} ")), "{level}");
         }
@@ -154,9 +176,22 @@ mod tests {
             10,
             "five broken, three flaky, one mended, one never sound"
         );
+        let row = |level: &str| {
+            let (_, row) = html.split_once(&format!("<th scope=\"row\">{level}</th>")).expect("its row");
+            row.split_once("</tr>").expect("its end").0.to_owned()
+        };
+        assert!(row("hard:12").contains("<td>search</td>"), "{}", row("hard:12"));
+        assert!(row("hard:39").contains("<td>–</td>") && !row("hard:39").contains("search"), "{}", row("hard:39"));
         for words in ["http:", "https:", "src=\"", "href=", "<script"] {
             assert!(!html.contains(words), "{words}");
         }
         assert!(page(&History::default()).contains("Every level was sound"));
+        let mut other = history;
+        other.builds.truncate(2);
+        other.builds[1].testers = vec!["<jump>".to_owned()];
+        let html = page(&other);
+        let words =
+            "<p>The testers changed in b00-again: no longer tested by search, newly tested by &lt;jump&gt;.</p>";
+        assert!(html.contains(words), "{html}");
     }
 }

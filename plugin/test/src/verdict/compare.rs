@@ -33,6 +33,9 @@ use std::{
 /// Expected share of false alarms among the levels reported as easier or harder.
 pub const FALSE_DISCOVERY_RATE: f64 = 0.05;
 
+/// Most levels that are named in a list on one line.
+const MOST_NAMES: usize = 5;
+
 /// Comparison of two results, level by level.
 ///
 /// A tester that drew no random number on a level, before and now, would repeat its episode exactly. So if it newly
@@ -41,6 +44,8 @@ pub const FALSE_DISCOVERY_RATE: f64 = 0.05;
 /// The episodes of all other testers are pooled and compared by Fisher's exact test. Over all levels, at most one
 /// alarm in twenty is false on average (Benjamini and Hochberg). A new proof that a level cannot be solved is always
 /// reported.
+///
+/// Testers of one of the tests alone are left out. A level that only they solved cannot be compared, and is named.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Comparison {
     /// Levels in both.
@@ -49,8 +54,11 @@ pub struct Comparison {
     pub only_now: u64,
     /// Levels that are no longer tested.
     pub only_before: u64,
-    /// Testers that are left out, with reasons.
+    /// Testers and detectors that are left out, with reasons.
     pub left_out: Vec<String>,
+    /// Levels that were solved in one of the tests alone, by testers that take no part in the other.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub other_testers: Vec<SolvedByOthers>,
     /// Levels that became unsolvable, or newly proved so.
     pub unsolvable: Vec<Change>,
     /// Levels that are solved less often.
@@ -131,6 +139,37 @@ impl Comparison {
         comparable(before, record).map(drop)
     }
 
+    /// Returns what is said if no level and no finding has changed.
+    pub fn no_change(&self) -> &'static str {
+        match self.other_testers.is_empty() {
+            true => "nothing has changed by more than chance",
+            false => "the testers of both tests show no change by more than chance",
+        }
+    }
+
+    /// Returns the same as a sentence.
+    pub(crate) fn no_change_sentence(&self) -> String {
+        let mut words = format!("{}.", self.no_change());
+        words.get_mut(..1).into_iter().for_each(str::make_ascii_uppercase);
+        words
+    }
+
+    /// Returns how many levels cannot be compared because the testers differ, and the first few of them; `None` if all can.
+    pub fn not_comparable(&self) -> Option<String> {
+        let count = self.other_testers.len();
+        let names: Vec<&str> = self.other_testers.iter().take(MOST_NAMES).map(|level| level.level.as_str()).collect();
+        let more = count.saturating_sub(names.len());
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        (count > 0).then(|| {
+            format!(
+                "{} cannot be compared, since the testers differ and only those of one test solved {}: {}{more}",
+                counted(count as u64, "level"),
+                if count == 1 { "it" } else { "them" },
+                names.join(", ")
+            )
+        })
+    }
+
     /// Returns whether something has become worse.
     pub fn has_alarms(&self) -> bool {
         !(self.unsolvable.is_empty() && self.harder.is_empty() && self.new_findings.is_empty())
@@ -171,6 +210,7 @@ impl Comparison {
             }
             return;
         }
+        self.other_testers.extend(SolvedByOthers::between(level, known, now));
         let (mut pooled_before, mut pooled_now) = (Trials::default(), Trials::default());
         for (before, now) in known.testers.iter().zip(&now.testers) {
             let (was, is) = (before.score.trials(), now.score.trials());
@@ -247,6 +287,38 @@ impl fmt::Display for Change {
     }
 }
 
+/// A level that was solved in one of two tests alone, by testers that take no part in the other: the testers differ, and
+/// nothing is known of the level.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct SolvedByOthers {
+    /// The level.
+    pub level: String,
+    /// True if it was solved before, false if it is now.
+    pub before: bool,
+    /// The testers that solved it.
+    pub by: Vec<String>,
+}
+
+impl SolvedByOthers {
+    /// Compares a level; `None` if it was solved in both tests or in none, or by a tester of both.
+    fn between(level: &str, before: &Known, now: &Known) -> Option<Self> {
+        let was_solved = !before.solved_by.is_empty();
+        if was_solved != now.solved_by.is_empty() {
+            return None;
+        }
+        let solved = if was_solved { before } else { now };
+        let by = solved.solved_by.clone();
+        (solved.total.successes == 0).then(|| Self { level: level.to_owned(), before: was_solved, by })
+    }
+}
+
+impl fmt::Display for SolvedByOthers {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let when = if self.before { "before" } else { "now" };
+        write!(f, "{}: solved {when} by {} alone, and the testers differ", self.level, self.by.join(", "))
+    }
+}
+
 /// A finding that is new or gone.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub struct FindingChange {
@@ -294,7 +366,8 @@ impl UnreachedSquares {
     ///
     /// The reason why the squares are not comparable.
     fn between(level: &str, before: &Known, now: &Known) -> Result<Option<Self>, PlacesLeftOut> {
-        if now.total.successes > 0 || !(before.has_places || now.has_places) {
+        // Also by a tester of this test alone.
+        if !now.solved_by.is_empty() || !(before.has_places || now.has_places) {
             return Ok(None);
         }
         if !(before.is_theirs && now.is_theirs) {
@@ -466,8 +539,12 @@ struct Known {
     visited: Option<VisitedSquares>,
     /// Random seed of the test, and episodes of each tester.
     draws: (u64, u32),
+    /// The testers of both tests.
     testers: Vec<TesterVerdict>,
+    /// Their episodes.
     total: Trials,
+    /// The testers that solved it, also those of one test alone.
+    solved_by: Vec<String>,
     is_unsolvable: bool,
     findings: BTreeSet<(String, Option<String>)>,
 }
@@ -486,6 +563,8 @@ impl Known {
             .filter(|finding| is_common(&finding.tester) && !other_detectors.contains(&finding.detector));
         let findings = findings.map(|finding| (finding.detector, finding.tester)).collect();
         let mut verdicts = level.testers;
+        let solvers = verdicts.iter().filter(|verdict| verdict.score.solved > 0);
+        let solved_by = solvers.map(|verdict| verdict.tester.clone()).collect();
         let own: Vec<TesterVerdict> = testers
             .iter()
             .filter_map(|name| {
@@ -495,7 +574,7 @@ impl Known {
             .collect();
         let mut total = Trials::default();
         own.iter().for_each(|tester| add(&mut total, tester.score.trials()));
-        Self { is_theirs, has_places, visited, draws, testers: own, total, is_unsolvable, findings }
+        Self { is_theirs, has_places, visited, draws, testers: own, total, solved_by, is_unsolvable, findings }
     }
 
     /// Returns whether the other episodes are these once more if the level is the same.
@@ -668,5 +747,7 @@ fn common_testers(before: &TestRecord, now: &TestRecord) -> (Vec<String>, Vec<St
             None => left_out.push(format!("the tester `{}` was not there before", tester.name)),
         }
     }
+    let gone = before.testers.iter().filter(|known| now.testers.iter().all(|tester| tester.name != known.name));
+    left_out.extend(gone.map(|known| format!("the tester `{}` is not there now", known.name)));
     (common, left_out)
 }

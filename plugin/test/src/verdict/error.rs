@@ -144,7 +144,7 @@ pub enum TestError {
          1767225600 (`git log -1 --format=%ct` prints that of a commit), or unset it"
     )]
     Date(String),
-    /// A finding could not be written.
+    /// A finding could not be written, or pins could not be read.
     #[error(transparent)]
     Finding(#[from] FindingError),
     /// The operating system refused.
@@ -175,6 +175,7 @@ pub enum TestError {
 impl HasExitCode for TestError {
     fn exit_code(&self) -> u8 {
         match self {
+            Self::Finding(FindingError::Pins { .. }) => 3,
             Self::Eval(EvalError::Fault(_)) | Self::Finding(_) | Self::Io { .. } | Self::NotKept { .. } => 2,
             _ => 3,
         }

@@ -152,8 +152,8 @@ pub struct TesterEvents {
 /// Ticks of a skill.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SkillTicks {
-    /// Its name: the number of z that is furthest from 0, counted from 1, and its sign, such as `z3+`. Only the first
-    /// 16 numbers count.
+    /// Its name: that of its [region](crate::verdict::TesterRecord::skill_names), or else the number of z that is furthest
+    /// from 0, counted from 1, and its sign, such as `z3+`. Only the first 16 numbers count.
     pub skill: String,
     /// Ticks.
     pub ticks: u64,

@@ -9,7 +9,7 @@ use crate::{
         shard::Shard,
     },
 };
-use bevy_playbot::{state_hash::StateHash, vision::ObservationConfig};
+use bevy_playbot::{skill_prior::NamedSkill, state_hash::StateHash, vision::ObservationConfig};
 use playbot_harness::{
     brief::shell_word,
     eval::{EvalError, Player},
@@ -267,6 +267,9 @@ pub struct TesterRecord {
     /// Levels of the tested range that the policy has learned from: by number, as a file, by their layout or their play.
     #[serde(default, skip_serializing_if = "is_off")]
     pub known: u64,
+    /// Named regions of the policy's skills, whose names results have. Files do not have the regions.
+    #[serde(skip)]
+    pub skill_names: Vec<NamedSkill>,
 }
 
 /// A checkpoint of a run.
@@ -278,7 +281,7 @@ pub struct TestedRun {
     pub step: u64,
 }
 
-/// Neither the path of a policy's file nor the levels that it knows identify the tester.
+/// Neither the path of a policy's file nor the levels that it knows nor the names of its skills identify the tester.
 impl PartialEq for TesterRecord {
     fn eq(&self, other: &Self) -> bool {
         (&self.name, &self.checksum, self.greedy) == (&other.name, &other.checksum, other.greedy)
@@ -287,10 +290,26 @@ impl PartialEq for TesterRecord {
 
 impl Eq for TesterRecord {}
 
+/// Most named regions of a tester's skills that count, the first ones: each takes a counter for each square of a map.
+pub(super) const MOST_REGIONS: usize = 64;
+
 impl TesterRecord {
+    /// Returns the regions of its skills whose names count.
+    pub(super) fn regions(&self) -> &[NamedSkill] {
+        &self.skill_names[..self.skill_names.len().min(MOST_REGIONS)]
+    }
+
     /// Makes the tester of a bot of the game.
     pub fn bot(name: impl Into<String>) -> Self {
-        Self { name: name.into(), checksum: None, greedy: false, file: None, run: None, known: 0 }
+        Self {
+            name: name.into(),
+            checksum: None,
+            greedy: false,
+            file: None,
+            run: None,
+            known: 0,
+            skill_names: Vec::new(),
+        }
     }
 
     /// Makes the tester of a policy's file, under its own name or else the file's.
@@ -364,6 +383,14 @@ mod tests {
             shard: shard.map(|shard| shard.parse().expect("a shard")),
             threads: 1,
         }
+    }
+
+    #[test]
+    fn only_the_first_of_many_regions_count() {
+        let region = NamedSkill { name: "jump".to_owned(), z: vec![0.0], radius: 0.5 };
+        let tester = TesterRecord { skill_names: vec![region; 99], ..TesterRecord::bot("ppo") };
+        assert_eq!(tester.regions().len(), MOST_REGIONS);
+        assert!(TesterRecord::bot("random").regions().is_empty());
     }
 
     #[test]

@@ -9,12 +9,13 @@ mod junit;
 
 use crate::{
     detectors::compares_testers,
-    findings::{FindingFiles, KeptFailure, Played, SeenFinding, SeenLevel},
+    findings::{Date, FindingFiles, KeptFailure, Played, SeenFinding, SeenLevel},
     verdict::{
         Finding, LevelOutcome, LevelVerdict, SquareEnds, TesterVerdict,
         compare::{Comparison, EarlierTest},
         error::{TestError, io_error},
         maps::level_argument,
+        pinned::PinnedFindings,
         plan::{TestPlan, TestRecord, Tester, TesterRecord, testers},
         reports::junit::write_junit,
         results::{Overview, RecordedTotal},
@@ -46,11 +47,13 @@ const MOST_CHANGES: usize = 20;
 ///
 /// # Errors
 ///
-/// The folder has no results, they are damaged, the files cannot be written, or [`report_date`] returns an error.
+/// The folder has no results, they or its pins are damaged, the files cannot be written, or [`report_date`] returns an
+/// error.
 pub fn write_reports(folder: &Path, comparison: Option<&Comparison>, program: &str) -> Result<Overview, TestError> {
     let overview = Overview::read(folder)?;
-    write_junit(folder, &overview, program, report_date()?.as_deref())?;
-    write(&folder.join(SUMMARY), &summary(&overview, comparison, program))?;
+    let pinned = PinnedFindings::read(folder, Date::today())?;
+    write_junit(folder, &overview, &pinned, program, report_date()?.as_deref())?;
+    write(&folder.join(SUMMARY), &summary(&overview, comparison, &pinned, program))?;
     if let Some(comparison) = comparison {
         let path = folder.join(AGAINST);
         let text = serde_json::to_string(comparison).map_err(|error| io_error("write", &path)(error.into()))?;
@@ -121,7 +124,12 @@ fn played_by(tester: &Tester, seed: u64) -> Played<'_> {
 // Summary in Markdown.
 
 /// Writes the page.
-pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, program: &str) -> String {
+pub(super) fn summary(
+    overview: &Overview,
+    comparison: Option<&Comparison>,
+    pinned: &PinnedFindings,
+    program: &str,
+) -> String {
     let record = &overview.record;
     let mut lines = vec![format!("# {} {}", record.game, markdown_cell(&record.range.to_string())), String::new()];
     let solved = Trials { successes: overview.solved, trials: overview.levels };
@@ -160,7 +168,8 @@ pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, prog
             ["", "## Levels to look at", "", "| level | outcome | problem |", "|---|---|---|"].map(str::to_owned),
         );
         for level in &overview.worst {
-            let what = markdown_cell(&failure(level));
+            let pin = pinned.describe_level(level).map_or_else(String::new, |pin| format!("; {pin}"));
+            let what = markdown_cell(&format!("{}{pin}", failure(level)));
             lines.push(format!("| {} | {} | {what} |", markdown_cell(&level.title()), level.outcome.name()));
         }
         let missing: Vec<String> =
@@ -229,12 +238,13 @@ fn compared(comparison: &Comparison, comparable: Option<String>) -> Vec<String> 
         ("New findings", texts(&comparison.new_findings)),
         ("Gone findings", texts(&comparison.gone_findings)),
         ("No longer reached", texts(&comparison.unreached)),
+        ("Not comparable", texts(&comparison.other_testers)),
     ] {
         lines.extend(list(title, changes));
     }
     let is_better = !(comparison.easier.is_empty() && comparison.gone_findings.is_empty());
     if !comparison.has_alarms() && !is_better && comparison.unreached.is_empty() {
-        lines.extend([String::new(), "Nothing has changed by more than chance.".to_owned()]);
+        lines.extend([String::new(), comparison.no_change_sentence()]);
     }
     lines
 }
@@ -283,6 +293,13 @@ fn message(level: &LevelVerdict) -> String {
     let more = if more > 0 { format!(" (and {more} more)") } else { String::new() };
     let stop = level.stop.as_ref().map_or_else(String::new, |stop| format!("; {stop}"));
     format!("{solved}{}{stop}{}{more}", lost(level), finding.unwrap_or_default())
+}
+
+impl LevelVerdict {
+    /// Describes how, why and where its episodes ended without the goal, for reports; `None` without such episodes.
+    pub(crate) fn describe_losses(&self) -> Option<String> {
+        lost(self).strip_prefix("; ").map(str::to_owned)
+    }
 }
 
 /// Describes how, why and where episodes ended without the goal; empty without such episodes.
@@ -476,6 +493,7 @@ mod tests {
         verdict::{
             CommonStop, Finding, LevelVerdict, Places, StopKind, TestRecord, TestedRun, TesterRecord, TooShort,
             folder::{Earlier, TestFolder},
+            pinned::tests::{in_file, pin},
             testing,
             testing::{tester, verdict},
         },
@@ -489,7 +507,7 @@ mod tests {
             let (mut folder, _) = TestFolder::open(parent.path(), &record, Earlier::Keep).expect("new");
             folder.keep(level).expect("writable");
             folder.finish().expect("writable");
-            summary(&Overview::read(parent.path()).expect("results"), None, "playbot")
+            summary(&Overview::read(parent.path()).expect("results"), None, &PinnedFindings::default(), "playbot")
         };
         let plain = said(&verdict(0, 2, 2));
         assert!(plain.contains("| random | 1 of 1") && plain.contains(" | – |"), "{plain}");
@@ -523,7 +541,7 @@ mod tests {
             }
             let courses = (0..).zip(recorded).map(|(index, ticks)| (index, course(*ticks))).collect();
             folder.finish_against(&courses).expect("writable");
-            summary(&Overview::read(parent.path()).expect("results"), None, "playbot")
+            summary(&Overview::read(parent.path()).expect("results"), None, &PinnedFindings::default(), "playbot")
         };
         let sound = said(&[1, 1, 1, 1], &[]);
         for words in ["look at", "problem", "Hardest", "--bot random", "recording"] {
@@ -563,6 +581,8 @@ mod tests {
         let start = "solved 0 of 4 episodes; lost 3, timed out 1";
         let causes = "saw 2 (near 12.5, 3.0), lava 1 (near 4.0, 1.0), time 1 (near 4.0, 1.0)";
         assert_eq!(message(&level), format!("{start}: {causes}"));
+        assert_eq!(level.describe_losses(), Some(format!("lost 3, timed out 1: {causes}")));
+        assert_eq!(verdict(0, 4, 4).describe_losses(), None);
         level.causes.insert("toad".to_owned(), 1);
         assert_eq!(message(&level), format!("{start}: {causes}, 1 more"));
         level.causes.clear();
@@ -611,11 +631,25 @@ mod tests {
         let (mut folder, _) = TestFolder::open(parent.path(), &record, Earlier::Keep).expect("new");
         (0..7).for_each(|index| folder.keep(&LevelVerdict { index, ..level.clone() }).expect("writable"));
         folder.finish().expect("writable");
-        let page = summary(&Overview::read(parent.path()).expect("results"), None, "jump");
+        let page = summary(&Overview::read(parent.path()).expect("results"), None, &PinnedFindings::default(), "jump");
         assert!(
             page.contains("Failed episodes that are not kept (7):\n\n- hard:1: no failed episode is kept, because "),
             "{page}"
         );
+    }
+
+    #[test]
+    fn pins_are_in_the_summary() {
+        let parent = tempfile::tempdir().expect("a folder");
+        let level = LevelVerdict { findings: vec![in_file("a")], ..verdict(0, 0, 1) };
+        let (mut folder, _) =
+            TestFolder::open(parent.path(), &testing::record("hard:0..0"), Earlier::Keep).expect("new");
+        folder.keep(&level).expect("writable");
+        folder.finish().expect("writable");
+        pin(parent.path(), &["a"], "2999-01-31");
+        write_reports(parent.path(), None, "jump").expect("writable");
+        let page = std::fs::read_to_string(parent.path().join(SUMMARY)).expect("written");
+        assert!(page.contains("; panic: a; pinned until 2999-01-31: drawn anew in spring |"), "{page}");
     }
 
     #[test]

@@ -12,15 +12,11 @@ use crate::{
 };
 use bevy::prelude::*;
 use bevy_playbot::{
-    action::Action,
     agent::{Agent, Control},
     engine::{EpisodeSeeds, panics::PanicReports, tick_world},
     episode::{Episode, EpisodeResult},
     fault::Fault,
     level::LevelQueue,
-    observation::Observation,
-    reward::Reward,
-    state_hash::StateHash,
     streams::AgentStreams,
     vision::{ObservationConfig, VisionError},
 };
@@ -162,7 +158,8 @@ impl TestWorld {
             world.entity_mut(agent).insert((LevelQueue::list(levels), EpisodeSeeds::new(seeds)));
             let control = player.seat(game, &mut world, agent);
             world.entity_mut(agent).insert(control);
-            let (walk, track) = (WalkCounter::new(agent, game.tick_hz()), TrackCounter::new(agent));
+            let walk = WalkCounter::new(agent, game.tick_hz(), tester.record.regions().to_vec());
+            let track = TrackCounter::new(agent);
             seats.push(Seat { agent, tasks: own, done: 0, walk, track });
         }
         player.install(&mut world);
@@ -463,28 +460,19 @@ impl WatchedSeat {
         if watch.detectors.ticks.is_empty() {
             return;
         }
-        let parts =
-            (world.get::<Episode>(self.agent), world.get::<Action>(self.agent), world.get::<Reward>(self.agent));
-        let (Some(episode), Some(action), Some(reward)) = parts else { return };
+        let Some(episode) = world.get::<Episode>(self.agent) else { return };
         if episode.tick == 0 || !(episode.is_running() || result.is_some()) {
             return;
         }
         let watches = self.watches.get_or_insert_with(|| begin(game, watch, episode.level));
-        let observation = world.get::<Observation>(self.agent);
         let proofs = GameProofs { game, mode: watch.mode, level: episode.level, world, agent: self.agent };
+        let Some(seen) = DetectorTick::of_agent(world, self.agent, episode.tick - 1) else { return };
         let moment = DetectorTick {
-            world,
-            agent: self.agent,
-            level: episode.level,
-            tick: episode.tick - 1,
-            action: &action.0,
-            observation: observation.map_or(&[][..], |observation| observation.vector.as_slice()),
-            state_hash: world.get::<StateHash>(self.agent).map_or(0, |hash| hash.0),
-            reward: reward.get(),
             position: if watches.is_empty() { None } else { game.tools().state.position(world, self.agent) },
             height: if watches.is_empty() { None } else { game.tools().state.height(world, self.agent) },
-            is_success: result.map_or_else(|| episode.is_success(), |result| result.success),
+            is_success: result.map_or(seen.is_success, |result| result.success),
             proofs: &proofs,
+            ..seen
         };
         watches.retain_mut(|(detector, watch)| {
             let message = watch.tick(&moment).or_else(|| result.and_then(|result| watch.end(&moment, &result)));

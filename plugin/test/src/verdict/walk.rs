@@ -2,9 +2,12 @@
 
 use crate::explore::{CellGrid, ExploredCell, cells_between, reach, round::open_cells};
 use bevy::{math::Vec2, prelude::*};
-use bevy_playbot::{episode::Episode, skill_prior::ActiveSkill};
+use bevy_playbot::{
+    episode::Episode,
+    skill_prior::{ActiveSkill, NamedSkill},
+};
 use playbot_harness::{floor_plan::FloorPlan, game::Game};
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, fmt};
 
 /// Seconds without a square that is new in the episode, after which time counts as lost.
 const PATIENCE: f64 = 2.0;
@@ -34,13 +37,15 @@ pub(super) struct SquareCount {
     pub ticks: u32,
     /// Ticks that were lost.
     pub lost: u32,
-    /// Ticks under each skill that was active there.
+    /// Ticks under each skill that was active there, by its number: see [`SkillName::of`].
     pub skills: Vec<(usize, u32)>,
 }
 
 /// Counts for one agent, episode after episode, in reused memory.
 pub(super) struct WalkCounter {
     agent: Entity,
+    /// Named regions of its skills.
+    regions: Vec<NamedSkill>,
     /// Ticks after which time is lost.
     patience: u32,
     /// The present level, and its squares.
@@ -65,10 +70,11 @@ pub(super) struct WalkCounter {
 }
 
 impl WalkCounter {
-    /// Makes a counter for an agent of a game with so many ticks per second.
-    pub fn new(agent: Entity, tick_hz: f64) -> Self {
+    /// Makes a counter for an agent of a game with so many ticks per second, and with these named regions of its skills.
+    pub fn new(agent: Entity, tick_hz: f64, regions: Vec<NamedSkill>) -> Self {
         Self {
             agent,
+            regions,
             patience: (PATIENCE * tick_hz).ceil() as u32,
             level: None,
             plan: None,
@@ -121,7 +127,7 @@ impl WalkCounter {
             self.visited.push(square);
             self.since_new = 0;
             self.ticks[square] = 1;
-            if let Some(skill) = skill_number(z).filter(|skill| *skill < self.names) {
+            if let Some(skill) = skill_number(&self.regions, z).filter(|skill| *skill < self.names) {
                 self.skills[square * self.names + skill] += 1;
             }
         }
@@ -130,7 +136,7 @@ impl WalkCounter {
     /// Counts a tick in one of so many squares, under a skill, which may be empty.
     fn count(&mut self, squares: usize, square: usize, z: &[f32]) {
         if self.visited.is_empty() {
-            self.names = skill_count(z);
+            self.names = skill_count(&self.regions, z);
             self.since_new = 0;
             grow(&mut self.ticks, squares);
             grow(&mut self.lost, squares);
@@ -146,7 +152,7 @@ impl WalkCounter {
         if self.since_new > self.patience {
             self.lost[square] += 1;
         }
-        if let Some(skill) = skill_number(z).filter(|skill| *skill < self.names) {
+        if let Some(skill) = skill_number(&self.regions, z).filter(|skill| *skill < self.names) {
             self.skills[square * self.names + skill] += 1;
         }
         match self.trail.last_mut() {
@@ -270,29 +276,58 @@ impl LevelSquares {
 
 // Names of skills that are points of a continuous space.
 
+/// Name of a skill in results.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum SkillName {
+    /// The name that somebody gave to a region of skills.
+    Region(String),
+    /// A direction: twice the number of z that is furthest from 0, counted from 0, and one more if that is negative.
+    Direction(usize),
+}
+
+impl SkillName {
+    /// Returns the name with a number in a walk: the regions come first, and then the directions.
+    pub fn of(regions: &[NamedSkill], number: usize) -> Self {
+        match regions.get(number) {
+            Some(region) => Self::Region(region.name.clone()),
+            None => Self::Direction(number - regions.len()),
+        }
+    }
+}
+
+impl fmt::Display for SkillName {
+    /// Writes a direction as `z3+` if the third number is furthest from 0, and is positive.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Region(name) => f.write_str(name),
+            Self::Direction(number) => {
+                write!(f, "z{}{}", number / 2 + 1, if number.is_multiple_of(2) { '+' } else { '-' })
+            }
+        }
+    }
+}
+
 /// Returns the number of names for skills of this length; 0 without a skill.
-fn skill_count(z: &[f32]) -> usize {
-    2 * z.len().min(MOST_NUMBERS)
+fn skill_count(regions: &[NamedSkill], z: &[f32]) -> usize {
+    if z.is_empty() { 0 } else { regions.len() + 2 * z.len().min(MOST_NUMBERS) }
 }
 
 /// Returns the number of a skill's name, below [`skill_count`].
 ///
-/// A skill is named after the nearest of several fixed directions: the positive and the negative half of each axis of
-/// z. That is the number of z that is furthest from 0, and its sign; of equally large numbers the first counts. So a
-/// name is independent of levels and draws, and is the same in every test of a policy.
-fn skill_number(z: &[f32]) -> Option<usize> {
+/// A skill in a named region has that name. Any other is named after the nearest of several fixed directions: the positive
+/// and the negative half of each axis of z. That is the number of z that is furthest from 0, and its sign; of equally large
+/// numbers the first counts. So a name is independent of levels and draws, and is the same in every test of a policy.
+fn skill_number(regions: &[NamedSkill], z: &[f32]) -> Option<usize> {
+    if let Some(name) = NamedSkill::name_of(regions, z) {
+        return regions.iter().position(|region| region.name == name);
+    }
     let mut nearest: Option<(usize, f32)> = None;
     for (number, value) in z.iter().take(MOST_NUMBERS).enumerate() {
         if nearest.is_none_or(|(_, longest)| value.abs() > longest.abs()) {
             nearest = Some((number, *value));
         }
     }
-    nearest.map(|(number, value)| 2 * number + usize::from(value < 0.0))
-}
-
-/// Returns the name: `z3+` for a skill whose third number is furthest from 0, and is positive.
-pub(super) fn skill_name(number: usize) -> String {
-    format!("z{}{}", number / 2 + 1, if number.is_multiple_of(2) { '+' } else { '-' })
+    nearest.map(|(number, value)| regions.len() + 2 * number + usize::from(value < 0.0))
 }
 
 #[cfg(test)]
@@ -305,7 +340,7 @@ mod tests {
     fn counter() -> WalkCounter {
         let plan = FloorPlan { bounds: Rect::new(0.0, 0.0, 16.0, 1.0), ..FloorPlan::default() };
         let squares = LevelSquares::of(&plan).expect("it has an extent");
-        WalkCounter { level: Some((7, Some(squares))), ..WalkCounter::new(Entity::PLACEHOLDER, 2.0) }
+        WalkCounter { level: Some((7, Some(squares))), ..WalkCounter::new(Entity::PLACEHOLDER, 2.0, Vec::new()) }
     }
 
     fn walked(counter: &mut WalkCounter, squares: &[usize], z: &[f32]) -> Walk {
@@ -413,14 +448,36 @@ mod tests {
 
     #[test]
     fn a_skill_is_called_by_its_number_furthest_from_zero() {
-        let name = |z: &[f32]| skill_number(z).map(skill_name);
+        let name = |z: &[f32]| skill_number(&[], z).map(|number| SkillName::of(&[], number).to_string());
         assert_eq!(name(&[0.1, -0.2, 1.5]).as_deref(), Some("z3+"));
         assert_eq!(name(&[0.1, -2.0, 1.5]).as_deref(), Some("z2-"));
         assert_eq!(name(&[1.0, -1.0]).as_deref(), Some("z1+"));
         assert_eq!(name(&[]), None);
         let mut long = [0.5; 40];
         long[30] = 9.0;
-        assert_eq!((name(&long).as_deref(), skill_count(&long)), (Some("z1+"), 32));
-        assert_eq!((skill_count(&[0.0; 3]), skill_count(&[])), (6, 0));
+        assert_eq!((name(&long).as_deref(), skill_count(&[], &long)), (Some("z1+"), 32));
+        assert_eq!((skill_count(&[], &[0.0; 3]), skill_count(&[], &[])), (6, 0));
+    }
+
+    #[test]
+    fn a_skill_in_a_named_region_has_the_name_of_the_region() {
+        let region = |name: &str, z: [f32; 2]| NamedSkill { name: name.to_owned(), z: z.to_vec(), radius: 0.5 };
+        let regions = vec![region("jump", [0.0, 1.0]), region("walk", [1.0, 0.0])];
+        let name = |z: &[f32]| SkillName::of(&regions, skill_number(&regions, z).expect("a skill")).to_string();
+        assert_eq!([name(&[0.2, 0.9]), name(&[0.8, 0.1]), name(&[0.0, -0.9])], ["jump", "walk", "z2-"]);
+        let mut counter = WalkCounter { regions: regions.clone(), ..counter() };
+        counter.count(16, 3, &[0.9, 0.0]);
+        counter.count(16, 3, &[-0.9, 0.0]);
+        counter.count(16, 4, &[0.9, 0.0]);
+        let walk = counter.take().expect("it went somewhere");
+        let names = |place: usize| {
+            let skills = &walk.counts[place].skills;
+            skills
+                .iter()
+                .map(|(skill, ticks)| (SkillName::of(&regions, *skill).to_string(), *ticks))
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(names(0), [("walk".to_owned(), 1), ("z1-".to_owned(), 1)]);
+        assert_eq!(names(1), [("walk".to_owned(), 1)]);
     }
 }

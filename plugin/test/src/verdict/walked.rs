@@ -4,9 +4,9 @@ use crate::verdict::{
     Finding, Places,
     maps::{EpisodePath, LevelMaps, PlanRows, SkillTicks, TesterEvents},
     played::{Played, PlayedEnd},
-    walk::{LevelSquares, Walk, skill_name},
+    walk::{LevelSquares, SkillName, Walk},
 };
-use bevy_playbot::episode::EpisodeEnd;
+use bevy_playbot::{episode::EpisodeEnd, skill_prior::NamedSkill};
 use playbot_harness::floor_plan::FloorPlan;
 use std::{
     cmp::Reverse,
@@ -30,13 +30,19 @@ pub(super) struct LevelVisits {
 struct Sum {
     ticks: u64,
     lost: u64,
-    skills: BTreeMap<usize, u64>,
+    skills: BTreeMap<SkillName, u64>,
 }
 
 impl LevelVisits {
     /// Sums up the walks in a level with this plan. `played` has the episodes of each tester, `names` the testers'
-    /// names. `None` if positions are unknown.
-    pub fn of(plan: &FloorPlan, names: &[&str], played: &[&[Played]], findings: &[Finding]) -> Option<Self> {
+    /// names, and `regions` the named regions of their skills. `None` if positions are unknown.
+    pub fn of(
+        plan: &FloorPlan,
+        names: &[&str],
+        regions: &[&[NamedSkill]],
+        played: &[&[Played]],
+        findings: &[Finding],
+    ) -> Option<Self> {
         let squares = LevelSquares::of(plan)?;
         let is_known = played.iter().any(|episodes| episodes.iter().any(|episode| episode.walk.is_some()));
         if !is_known {
@@ -49,7 +55,8 @@ impl LevelVisits {
         };
         let mut sums: BTreeMap<usize, Sum> = BTreeMap::new();
         let (mut testers, mut events) = (Vec::new(), Vec::new());
-        for episodes in played {
+        for (tester, episodes) in played.iter().enumerate() {
+            let regions = regions.get(tester).copied().unwrap_or_default();
             let (mut visited, mut lost) = (BTreeSet::new(), BTreeMap::<usize, u64>::new());
             let walks = episodes.iter().filter_map(|episode| episode.walk.as_ref());
             for walk in walks.filter(|walk| walk.squares == squares) {
@@ -62,7 +69,7 @@ impl LevelVisits {
                     sum.ticks += u64::from(count.ticks);
                     sum.lost += u64::from(count.lost);
                     for (skill, ticks) in &count.skills {
-                        *sum.skills.entry(*skill).or_default() += u64::from(*ticks);
+                        *sum.skills.entry(SkillName::of(regions, *skill)).or_default() += u64::from(*ticks);
                     }
                 }
             }
@@ -123,17 +130,19 @@ fn best(names: &[&str], played: &[&[Played]]) -> Option<EpisodePath> {
 }
 
 fn maps(squares: &LevelSquares, sums: &BTreeMap<usize, Sum>) -> LevelMaps {
-    let mut totals: BTreeMap<usize, u64> = BTreeMap::new();
+    let mut totals: BTreeMap<&SkillName, u64> = BTreeMap::new();
     for (skill, ticks) in sums.values().flat_map(|sum| &sum.skills) {
-        *totals.entry(*skill).or_default() += ticks;
+        *totals.entry(skill).or_default() += ticks;
     }
-    let mut order: Vec<(usize, u64)> = totals.into_iter().collect();
+    let mut order: Vec<(&SkillName, u64)> = totals.into_iter().collect();
     // Of equally frequent ones the first stays first.
     order.sort_by_key(|(_, ticks)| Reverse(*ticks));
-    let rank = |skill: usize| order.iter().position(|(known, _)| *known == skill);
-    let most =
-        |sum: &Sum| sum.skills.iter().max_by_key(|(skill, ticks)| (**ticks, Reverse(**skill))).map(|(skill, _)| *skill);
-    let skill_at = sums.iter().filter_map(|(square, sum)| Some([*square as u64, rank(most(sum)?)? as u64]));
+    let rank = |skill: &SkillName| order.iter().position(|(known, _)| *known == skill);
+    let most = |sum: &Sum| {
+        let most = sum.skills.iter().max_by_key(|(skill, ticks)| (**ticks, Reverse(*skill)));
+        most.and_then(|(skill, _)| rank(skill))
+    };
+    let skill_at = sums.iter().filter_map(|(square, sum)| Some([*square as u64, most(sum)? as u64]));
     LevelMaps {
         x: squares.grid.origin.x,
         y: squares.grid.origin.y,
@@ -143,7 +152,7 @@ fn maps(squares: &LevelSquares, sums: &BTreeMap<usize, Sum>) -> LevelMaps {
         visits: sums.iter().map(|(square, sum)| [*square as u64, sum.ticks]).collect(),
         lost: sums.iter().filter(|(_, sum)| sum.lost > 0).map(|(square, sum)| [*square as u64, sum.lost]).collect(),
         skill_at: skill_at.collect(),
-        skills: order.iter().map(|(skill, ticks)| SkillTicks { skill: skill_name(*skill), ticks: *ticks }).collect(),
+        skills: order.iter().map(|(skill, ticks)| SkillTicks { skill: skill.to_string(), ticks: *ticks }).collect(),
         failure: None,
         best: None,
         plan: None,
@@ -215,7 +224,7 @@ mod tests {
     fn walks_of_all_testers_are_added_up() {
         let one = [episode(true, &[(0, 2, 0, &[(3, 2)]), (1, 5, 1, &[(0, 2), (3, 3)])])];
         let other = [episode(false, &[(1, 1, 0, &[]), (2, 1, 1, &[(0, 1)]), (4, 1, 0, &[])])];
-        let walked = LevelVisits::of(&plan(), &["a", "b"], &[&one, &other], &[]).expect("walks are known");
+        let walked = LevelVisits::of(&plan(), &["a", "b"], &[], &[&one, &other], &[]).expect("walks are known");
         let places = |visited| Some(Places { visited, open: 4 });
         // Square 4 lies in the wall, so it is not an open square.
         assert_eq!((walked.testers, walked.places), (vec![places(2), places(2)], places(3)));
@@ -239,6 +248,19 @@ mod tests {
     }
 
     #[test]
+    fn skills_of_one_name_are_added_up_whatever_their_numbers() {
+        let region = |name: &str| NamedSkill { name: name.to_owned(), z: vec![0.0], radius: 0.5 };
+        let (one, other) = ([region("jump")], [region("walk"), region("jump")]);
+        let episodes =
+            [[episode(true, &[(0, 3, 0, &[(0, 2), (1, 1)])])], [episode(true, &[(0, 9, 0, &[(1, 4), (2, 5)])])]];
+        let played: Vec<&[Played]> = episodes.iter().map(|own| own.as_slice()).collect();
+        let walked = LevelVisits::of(&plan(), &["a", "b"], &[&one, &other], &played, &[]).expect("walks are known");
+        let skill = |skill: &str| SkillTicks { skill: skill.to_owned(), ticks: 6 };
+        assert_eq!(walked.maps.skills, [skill("jump"), skill("z1+")]);
+        assert_eq!(walked.maps.skill_at, [[0, 0]]);
+    }
+
+    #[test]
     fn events_are_those_of_each_tester_and_the_best_path_is_the_shortest() {
         let ended = |end: EpisodeEnd, success: bool, ticks: u32, at: f32, square: usize| {
             let result = EpisodeResult { level: 0, end, success, ticks, clipped: 0, total_reward: 0.0 };
@@ -253,12 +275,12 @@ mod tests {
             ended(EpisodeEnd::WON, true, 7, 3.5, 3),
         ];
         let other = [ended(EpisodeEnd::WON, true, 5, 3.5, 1), ended(EpisodeEnd::WON, true, 5, 3.5, 0)];
-        let walked = LevelVisits::of(&plan(), &["a", "b"], &[&one, &other], &[]).expect("walks are known");
+        let walked = LevelVisits::of(&plan(), &["a", "b"], &[], &[&one, &other], &[]).expect("walks are known");
         assert_eq!(walked.events[0].ends, [[2, 1, 1], [4, 1, 0]], "far away is at the border");
         assert!(walked.events[1].ends.is_empty(), "it has solved the level");
         let best = walked.maps.best.expect("it was solved");
         assert_eq!((best.tester.as_str(), best.episode, best.path), ("b", 0, vec![[1, 1]]));
-        let lost = LevelVisits::of(&plan(), &["a"], &[&one[..2]], &[]).expect("walks are known");
+        let lost = LevelVisits::of(&plan(), &["a"], &[], &[&one[..2]], &[]).expect("walks are known");
         assert_eq!(lost.maps.best, None);
     }
 
@@ -274,11 +296,12 @@ mod tests {
             file: None,
             settings: Vec::new(),
         };
-        let found = LevelVisits::of(&plan(), &["a"], &[&episodes], &[finding]).and_then(|walked| walked.maps.failure);
+        let found =
+            LevelVisits::of(&plan(), &["a"], &[], &[&episodes], &[finding]).and_then(|walked| walked.maps.failure);
         assert_eq!(found.map(|failure| (failure.episode, failure.path)), Some((1, vec![[3, 1]])));
-        let solved = LevelVisits::of(&plan(), &["a"], &[&episodes[1..]], &[]).expect("walks are known");
+        let solved = LevelVisits::of(&plan(), &["a"], &[], &[&episodes[1..]], &[]).expect("walks are known");
         assert_eq!(solved.maps.failure, None);
         let unknown = [Played { walk: None, ..episodes[0].clone() }];
-        assert!(LevelVisits::of(&plan(), &["a"], &[&unknown], &[]).is_none());
+        assert!(LevelVisits::of(&plan(), &["a"], &[], &[&unknown], &[]).is_none());
     }
 }

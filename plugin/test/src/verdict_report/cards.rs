@@ -6,6 +6,7 @@ use crate::{
     verdict_report::{
         drawn::{Drawer, Drawings, Drawn},
         files::PictureFiles,
+        picture::plan_with_path,
         selection::Selection,
         text,
     },
@@ -27,17 +28,37 @@ const MOST_LINES: usize = 20;
 /// Width and height of a curve, pixels.
 const CURVE: [f32; 2] = [280.0, 44.0];
 
-/// The last ticks before a finding, as the game shows them.
+/// The last ticks before a finding as the game shows them, or those around the tick since which something is wrong.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FindingScene {
-    /// The last tick as a PNG.
+    /// The last tick, or that since which something is wrong, as a PNG.
     pub still: Vec<u8>,
-    /// All of them as an animated PNG.
-    pub moving: Vec<u8>,
+    /// A picture of each tick, if there are several.
+    pub film: Option<SceneFilm>,
     /// The ticks.
     pub ticks: Vec<SceneTick>,
+    /// The tick since which something is wrong, if these are the ticks around it.
+    pub since: Option<u32>,
+    /// Positions of the agent in all ticks of the episode up to the last of these, as far as the game reports them.
+    pub path: Vec<[f32; 2]>,
     /// Lines that the game logged in these ticks.
     pub log: Vec<GameLogLine>,
+}
+
+/// Pictures of the last ticks of a scene, side by side in one PNG. So a page shows each of them in turn by moving the PNG,
+/// also where it lies beside the page, whose bytes a script cannot read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneFilm {
+    /// The PNG: rows of pictures of one size, from the left to the right and from the top to the bottom.
+    pub png: Vec<u8>,
+    /// Pictures, at least 1. The last one shows the last tick.
+    pub pictures: usize,
+    /// Pictures in a row, at least 1.
+    pub columns: usize,
+    /// Width and height of a picture, pixels.
+    pub size: [usize; 2],
+    /// Milliseconds of a tick.
+    pub pause: u32,
 }
 
 /// A line of a game's log.
@@ -60,9 +81,19 @@ pub struct SceneTick {
     pub reward: f32,
     /// Position of the agent, if the game reports it.
     pub position: Option<[f32; 2]>,
+    /// Number of entities in the World.
+    pub entities: u32,
 }
 
-/// Returns the last ticks before the finding in a file; `None` if they cannot be drawn.
+impl FindingScene {
+    /// Returns the tick that the still shows.
+    fn shown(&self) -> Option<&SceneTick> {
+        let since = self.since.and_then(|since| self.ticks.iter().find(|tick| tick.tick == since));
+        since.or(self.ticks.last())
+    }
+}
+
+/// Returns the ticks of the finding in a file; `None` if they cannot be drawn.
 pub type Scenes<'a> = &'a dyn Fn(&Path) -> Option<FindingScene>;
 
 /// Writes the section of the page; empty without findings. `folder` is that of the results.
@@ -73,8 +104,11 @@ pub(crate) fn cards(
     folder: &Path,
     scenes: Option<Scenes>,
 ) -> String {
-    let found = || selection.levels.iter().flat_map(|level| level.findings.iter().map(move |finding| (level, finding)));
-    let all = found().count();
+    let found = selection.levels.iter().flat_map(|level| level.findings.iter().map(move |finding| (level, finding)));
+    let mut found: Vec<(&LevelVerdict, &Finding)> = found.collect();
+    // A stable sort: those that do not count come last, and the others stay as they are.
+    found.sort_by_key(|(_, finding)| selection.pinned.of_finding(finding).is_some());
+    let all = found.len();
     if all == 0 {
         return String::new();
     }
@@ -88,17 +122,36 @@ pub(crate) fn cards(
     out += "</p>\n<div class=\"cards\">\n";
     let mut drawer = Drawer::new(drawings);
     let mut letters = 0;
-    for (level, finding) in found().take(MOST_CARDS) {
+    for (level, finding) in found.into_iter().take(MOST_CARDS) {
         let file = finding.file.as_ref().map(|file| folder.join(file));
         let scene = file.as_deref().zip(scenes).filter(|_| letters < MOST_LETTERS);
         let scene = scene.and_then(|(file, scenes)| scenes(file));
-        let pictures = scene.as_ref().map_or_else(String::new, |scene| scene_html(scene, &drawings.files));
-        letters += pictures.len();
-        let plan =
-            if finding.tester.is_none() || pictures.is_empty() { plan(&mut drawer, level) } else { String::new() };
-        out += &card(level, finding, program, &(pictures + &plan));
+        let picture = scene.as_ref().map_or_else(String::new, |scene| picture(scene, &drawings.files));
+        letters += picture.len();
+        let path = scene.as_ref().map_or_else(String::new, |scene| path(level, scene, drawings));
+        let is_bare = path.is_empty() && (finding.tester.is_none() || picture.is_empty());
+        let plan = if is_bare { plan(&mut drawer, level) } else { path };
+        let pictures = match (picture.is_empty(), plan.is_empty()) {
+            (false, false) => format!("<div class=\"beside\">\n{picture}{plan}</div>\n"),
+            _ => picture + &plan,
+        };
+        let pictures = pictures + &scene.as_ref().map_or_else(String::new, curves);
+        out += &card(level, finding, selection.pinned.describe(finding), program, &pictures);
     }
     out + "</div>\n</section>\n"
+}
+
+/// Draws the plan of a level with the path of the agent up to the finding; empty without a plan or positions.
+fn path(level: &LevelVerdict, scene: &FindingScene, drawings: &Drawings) -> String {
+    let label = format!("{}: the path to the finding", level.title());
+    let cross = scene.since.and(scene.shown()).and_then(|tick| tick.position);
+    let drawn = drawings.plans.get(level).and_then(|plan| plan_with_path(&plan, &scene.path, cross, &label));
+    let words = match scene.since.filter(|_| cross.is_some()) {
+        Some(since) => format!("The path of the agent, which is at the cross in tick {since}."),
+        None => "The path to the finding, which is at the cross.".to_owned(),
+    };
+    let figure = |drawn: String| format!("<figure>{drawn}<figcaption class=\"key\">{words}</figcaption></figure>\n");
+    drawn.map_or_else(String::new, figure)
 }
 
 /// Draws the plan of a level, with the squares that were reached if it was not solved.
@@ -111,7 +164,7 @@ fn plan(drawer: &mut Drawer, level: &LevelVerdict) -> String {
     })
 }
 
-fn card(level: &LevelVerdict, finding: &Finding, program: &str, pictures: &str) -> String {
+fn card(level: &LevelVerdict, finding: &Finding, pin: Option<String>, program: &str, pictures: &str) -> String {
     let who = finding.tester.as_ref().map_or_else(|| "found without play".to_owned(), |tester| escape(tester));
     let episode = finding.episode.map_or_else(String::new, |episode| format!(", episode {episode}"));
     let tick = finding.tick.map_or_else(String::new, |tick| format!(", tick {tick}"));
@@ -120,26 +173,53 @@ fn card(level: &LevelVerdict, finding: &Finding, program: &str, pictures: &str) 
         let command = format!("{program} replay {} --window", shell_word(file));
         format!("<pre><code>{}</code></pre>\n", escape(&command))
     });
+    // Levels that are found without play often have the same message, and differ in where testers end.
+    let losses = level.describe_losses().filter(|_| finding.tester.is_none());
+    let losses = losses.map_or_else(String::new, |losses| format!("<p>Episodes: {}</p>\n", text(&losses)));
+    let class = if pin.is_some() { "finding pinned" } else { "finding" };
+    let pin = pin.map_or_else(String::new, |pin| format!("<p><b>{}</b></p>\n", text(&pin)));
     format!(
-        "<article class=\"finding\">\n<h3>{}</h3>\n<p class=\"key\">{}; {who}{episode}{tick}</p>\n<p>{}</p>\n{pictures}{replay}</article>\n",
+        "<article class=\"{class}\">\n<h3>{}</h3>\n<p class=\"key\">{}; {who}{episode}{tick}</p>\n{pin}<p>{}</p>\n{losses}{pictures}{replay}</article>\n",
         escape(&finding.detector),
         text(&level.title()),
         text(&finding.message)
     )
 }
 
-/// Writes the pictures of a scene with the keys below, and its curves.
-fn scene_html(scene: &FindingScene, files: &PictureFiles) -> String {
-    let (Some(first), Some(last)) = (scene.ticks.first(), scene.ticks.last()) else { return String::new() };
-    let ticks = format!("ticks {} to {}", first.tick, last.tick);
-    let mut out = format!(
-        "<figure class=\"scene\"><img src=\"{}\" data-moving=\"{}\" alt=\"The game in tick {}\" \
-         loading=\"lazy\"><button type=\"button\" class=\"moving\" hidden>Play {ticks}</button></figure>\n",
-        files.source(&scene.still),
-        files.source(&scene.moving),
-        last.tick
-    );
-    let _ = writeln!(out, "<p class=\"keys\">{}</p>", keys(&scene.ticks));
+/// Writes the picture of a scene, and buttons that show it tick by tick. Without script, the still is there.
+fn picture(scene: &FindingScene, files: &PictureFiles) -> String {
+    let [Some(last), Some(shown)] = [scene.ticks.last(), scene.shown()].map(|tick| tick.map(|tick| tick.tick)) else {
+        return String::new();
+    };
+    let still =
+        format!("<img src=\"{}\" alt=\"The game in tick {shown}\" loading=\"lazy\">", files.source(&scene.still));
+    let since = scene.since.map_or_else(String::new, |since| {
+        format!("<figcaption class=\"key\">Around tick {since}, since which it is so.</figcaption>")
+    });
+    let film = scene.film.as_ref().filter(|film| film.columns > 0 && (2..=scene.ticks.len()).contains(&film.pictures));
+    let Some(film) = film else { return format!("<figure class=\"scene\">{still}{since}</figure>\n") };
+    let SceneFilm { pictures, columns, size: [width, height], pause, .. } = film;
+    let filmed = &scene.ticks[scene.ticks.len() - pictures..];
+    let first = filmed[0].tick;
+    let place = filmed.iter().position(|tick| tick.tick == shown).unwrap_or(pictures - 1);
+    format!(
+        "<figure class=\"scene\" data-film=\"{}\" data-pictures=\"{pictures}\" data-columns=\"{columns}\" \
+         data-ratio=\"{width} / {height}\" data-first=\"{first}\" data-shown=\"{place}\" data-pause=\"{pause}\">{still}\
+         <div class=\"steps\" role=\"group\" aria-label=\"Ticks {first} to {last}\" hidden>\
+         <button type=\"button\" aria-label=\"One tick back\">−1</button>\
+         <button type=\"button\">Play</button>\
+         <button type=\"button\" aria-label=\"One tick on\">+1</button> \
+         <output>tick {shown}</output> of {first} to {last}</div>{since}</figure>\n",
+        files.source(&film.png)
+    )
+}
+
+/// Writes the keys of a scene, its curves and the lines of the log.
+fn curves(scene: &FindingScene) -> String {
+    if scene.ticks.is_empty() {
+        return String::new();
+    }
+    let mut out = format!("<p class=\"keys\">{}</p>\n", keys(&scene.ticks));
     let positions: Option<Vec<[f32; 2]>> = scene.ticks.iter().map(|tick| tick.position).collect();
     if let Some(positions) = positions.filter(|positions| positions.len() > 1) {
         let along = |axis: usize| positions.iter().map(|position| position[axis]).collect::<Vec<f32>>();
@@ -152,6 +232,10 @@ fn scene_html(scene: &FindingScene, files: &PictureFiles) -> String {
     let rewards: Vec<f32> = scene.ticks.iter().map(|tick| tick.reward).collect();
     if rewards.iter().any(|reward| *reward != 0.0) {
         out += &curve("reward", &rewards);
+    }
+    let entities: Vec<f32> = scene.ticks.iter().map(|tick| tick.entities as f32).collect();
+    if entities.iter().any(|count| *count != entities[0]) {
+        out += &curve("entities", &entities);
     }
     out + &log(&scene.log)
 }
@@ -215,12 +299,43 @@ fn curve(name: &str, values: &[f32]) -> String {
     )
 }
 
+// The tick since which something is wrong. Some detectors wait until they are sure, so the cause of a finding lies ticks
+// before it. Their messages name it as `since tick 807` or as `for 300 ticks`, and so may those of a game's own detectors.
+// A message is in every finding, so older ones are shown around that tick, too.
+
+/// Words before the number of a tick.
+const SINCE: &str = "since tick ";
+
+/// Words around a number of ticks.
+const FOR: [&str; 2] = ["for ", " ticks"];
+
+/// Returns the tick since which something is wrong, of a finding in the tick `found`. `None` if the message names no tick
+/// before that one.
+pub fn tick_since(message: &str, found: u32) -> Option<u32> {
+    let since = message.split(SINCE).skip(1).find_map(|rest| number(rest).map(|(tick, _)| tick));
+    let lasted = || {
+        let ticks = message.split(FOR[0]).skip(1).filter_map(number).find(|(_, rest)| rest.starts_with(FOR[1]));
+        ticks.map(|(ticks, _)| found.saturating_sub(ticks))
+    };
+    since.or_else(lasted).filter(|since| *since < found)
+}
+
+/// Returns the number with which a text begins, and the text after it.
+fn number(text: &str) -> Option<(u32, &str)> {
+    let end = text.find(|letter: char| !letter.is_ascii_digit()).unwrap_or(text.len());
+    let (digits, rest) = text.split_at(end);
+    Some((digits.parse().ok()?, rest))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::verdict_report::{
-        drawn::Plans,
-        testing::{Garden, finding, level, record},
+    use crate::{
+        verdict::{PinnedFindings, SquareEnds},
+        verdict_report::{
+            drawn::Plans,
+            testing::{Garden, finding, in_file, level, pin, record},
+        },
     };
 
     fn scene() -> FindingScene {
@@ -229,8 +344,17 @@ mod tests {
             action: if number < 7 { "right" } else { "jump <b>" }.to_owned(),
             reward: 0.0,
             position: Some([f32::from(number), 2.0]),
+            entities: 7 + u32::from(number > 4),
         };
-        FindingScene { still: vec![1, 2, 3], moving: vec![4, 5], ticks: (0..10).map(tick).collect(), log: Vec::new() }
+        let film = SceneFilm { png: vec![4, 5], pictures: 8, columns: 3, size: [192, 220], pause: 66 };
+        FindingScene {
+            still: vec![1, 2, 3],
+            film: Some(film),
+            ticks: (0..10).map(tick).collect(),
+            since: None,
+            path: (0..50_u16).map(|tick| [f32::from(tick), 2.0]).collect(),
+            log: Vec::new(),
+        }
     }
 
     #[test]
@@ -259,7 +383,7 @@ mod tests {
             file: Some("findings/a b.finding".to_owned()),
             ..finding("stuck", "it <i>is</i>")
         }];
-        let selection = Selection { levels: vec![bad], left_out: 0, gallery: Vec::new(), all: 1 };
+        let selection = Selection { levels: vec![bad], all: 1, ..Selection::default() };
         let scenes = |path: &Path| {
             (path == Path::new("runs/a test/findings/a b.finding")).then(|| {
                 let line = LogLine { level: tracing::Level::INFO, message: "the door opens".to_owned() };
@@ -270,21 +394,100 @@ mod tests {
         for words in [
             "<h3>stuck</h3>",
             "it &lt;i&gt;is&lt;/i&gt;",
-            "src=\"data:image/png;base64,AQID\" data-moving=\"data:image/png;base64,BAU=\"",
-            "Play ticks 40 to 49",
+            "src=\"data:image/png;base64,AQID\"",
+            "data-film=\"data:image/png;base64,BAU=\" data-pictures=\"8\" data-columns=\"3\" data-ratio=\"192 / 220\" \
+             data-first=\"42\" data-shown=\"7\" data-pause=\"66\"",
+            "aria-label=\"One tick back\"",
+            "<output>tick 49</output> of 42 to 49",
+            "<div class=\"beside\">\n<figure class=\"scene\"",
+            "<path class=\"way\"",
             "<kbd>right</kbd>&nbsp;×&nbsp;7 <kbd>jump &lt;b&gt;</kbd>&nbsp;×&nbsp;3",
             "x: 0 to 9.000, at last 9.000",
             "moved in a tick: 1.000 to 1.000",
+            "entities: 7.000 to 8.000, at last 8.000",
             "<li class=\"info\">tick 48 INFO the door opens</li>",
             "jump replay &#39;findings/a b.finding&#39; --window",
         ] {
             assert!(html.contains(words), "{words} in {html}");
         }
         assert!(!html.contains("reward:"), "there was none: {html}");
+        let (scene_at, plan_at) = (html.find("class=\"scene\""), html.find("<svg class=\"level\""));
+        assert!(scene_at < plan_at && html.matches("<svg class=\"level\"").count() == 1, "one plan, beside: {html}");
         let without = cards(&selection, &drawings, "jump", Path::new("runs"), None);
         assert!(without.contains("<svg class=\"level\"") && !without.contains("<img"), "the plan instead: {without}");
-        let sound = Selection { levels: vec![level(0, 9, 9, 40)], left_out: 0, gallery: Vec::new(), all: 1 };
+        let sound = Selection { levels: vec![level(0, 9, 9, 40)], all: 1, ..Selection::default() };
         assert_eq!(cards(&sound, &drawings, "jump", Path::new("runs"), None), "");
+    }
+
+    #[test]
+    fn a_finding_that_names_an_earlier_tick_is_shown_around_it() {
+        let tested = record("hard:0..1", None);
+        let drawings = Drawings::new(Plans::of(Some(&Garden), &tested), PictureFiles::default(), None, 0);
+        let locked = FindingScene { since: Some(45), ..scene() };
+        let html = picture(&locked, &drawings.files) + &path(&level(1, 0, 9, 0), &locked, &drawings);
+        for words in [
+            "alt=\"The game in tick 45\"",
+            "data-first=\"42\" data-shown=\"3\"",
+            "<output>tick 45</output> of 42 to 49",
+            "Around tick 45, since which it is so.",
+            "The path of the agent, which is at the cross in tick 45.",
+            // Its position is 5, 2, and a unit 10 of the drawing.
+            "<path class=\"cross\" d=\"M23 113l54 54m0-54l-54 54\"/>",
+        ] {
+            assert!(html.contains(words), "{words} in {html}");
+        }
+        let left_out = picture(&FindingScene { since: Some(40), ..scene() }, &drawings.files);
+        assert!(
+            left_out.contains("alt=\"The game in tick 40\"") && left_out.contains("data-shown=\"7\""),
+            "{left_out}"
+        );
+        let elsewhere = picture(&FindingScene { since: Some(7), ..scene() }, &drawings.files);
+        assert!(elsewhere.contains("The game in tick 49"), "{elsewhere}");
+    }
+
+    #[test]
+    fn pinned_findings_say_so_and_come_after_the_others() {
+        let folder = tempfile::tempdir().expect("a folder");
+        pin(folder.path(), &["a"], "2027-01-31");
+        let tested = record("hard:0..1", None);
+        let drawings = Drawings::new(Plans::of(Some(&Garden), &tested), PictureFiles::default(), None, 0);
+        let with = |index: u64, name: &str| LevelVerdict { findings: vec![in_file(name)], ..level(index, 0, 9, 0) };
+        let pinned = PinnedFindings::read(folder.path(), "2027-01-01".parse().expect("a day")).expect("pins");
+        let selection = Selection { levels: vec![with(0, "a"), with(1, "b")], all: 2, pinned, ..Selection::default() };
+        let html = cards(&selection, &drawings, "jump", folder.path(), None);
+        let words = "<article class=\"finding pinned\">";
+        let [open, pinned] = ["<article class=\"finding\">", words].map(|words| html.find(words).expect(words));
+        assert!(open < pinned, "{html}");
+        let words = "<p><b>pinned until 2027-01-31: drawn anew in spring</b></p>";
+        assert_eq!((html.matches(words).count(), html.matches("<article").count()), (1, 2), "{html}");
+    }
+
+    #[test]
+    fn a_finding_without_play_has_the_ends_of_the_episodes() {
+        let tested = record("hard:0..1", None);
+        let drawings = Drawings::new(Plans::of(Some(&Garden), &tested), PictureFiles::default(), None, 0);
+        let sealed = Finding { tester: None, ..finding("unreachable-goal", "a search ended without it") };
+        let causes = [("lava <b>".to_owned(), 9)].into();
+        let end = SquareEnds { x: 7.0, y: 5.0, lost: 9, timed_out: 0, causes: [("lava <b>".to_owned(), 9)].into() };
+        let one = LevelVerdict { findings: vec![sealed], causes, ends: vec![end], ..level(0, 0, 9, 0) };
+        let selection = Selection { levels: vec![one], all: 1, ..Selection::default() };
+        let html = cards(&selection, &drawings, "jump", Path::new("runs"), None);
+        assert!(html.contains("<p>Episodes: lost 9: lava &lt;b&gt; 9 (near 7.0, 5.0)</p>"), "{html}");
+    }
+
+    #[test]
+    fn a_scene_of_one_picture_has_no_buttons() {
+        let files = PictureFiles::default();
+        let film = |pictures: usize, columns: usize| {
+            let film = scene().film.map(|film| SceneFilm { pictures, columns, ..film });
+            picture(&FindingScene { film, ..scene() }, &files)
+        };
+        // More pictures than ticks cannot be.
+        for html in [film(1, 1), film(11, 3), film(8, 0), picture(&FindingScene { film: None, ..scene() }, &files)] {
+            assert!(html.contains("The game in tick 49") && !html.contains("<button"), "{html}");
+        }
+        assert!(film(10, 4).contains("<output>tick 49</output> of 40 to 49"));
+        assert_eq!(picture(&FindingScene::default(), &files), "");
     }
 
     #[test]
@@ -292,5 +495,24 @@ mod tests {
         assert_eq!(curve("x", &[f32::NAN, f32::INFINITY]), "");
         let flat = curve("x", &[3.0, f32::NAN, 3.0]);
         assert!(flat.contains("points=\"0,42 280,42\""), "{flat}");
+    }
+
+    #[test]
+    fn messages_name_the_tick_since_which_something_is_wrong() {
+        for (message, found, since) in [
+            ("since tick 807 at the latest the goal cannot be reached", 907, Some(807)),
+            ("the agent has not left 4.0, 1.5 for 300 ticks, whatever it did", 455, Some(155)),
+            ("nothing has changed since the start of the episode, for 300 ticks, whatever the agent did", 300, Some(0)),
+            ("the agent waits for the door for 20 ticks", 50, Some(30)),
+            ("locked since tick 12 for 300 ticks", 50, Some(12)),
+            ("stays for 300 ticks", 40, Some(0)),
+            ("since tick 907 at the latest the goal cannot be reached", 907, None),
+            ("the agent is lost after 20 ticks", 20, None),
+            ("it rests for ticks, since tick x, for 9 seconds", 20, None),
+            ("for 99999999999999999999 ticks", 20, None),
+            ("", 0, None),
+        ] {
+            assert_eq!(tick_since(message, found), since, "{message}");
+        }
     }
 }

@@ -24,7 +24,7 @@ use std::{
 };
 
 /// Largest number of levels with a picture, the worst ones.
-const MOST_PICTURES: usize = 200;
+pub(crate) const MOST_PICTURES: usize = 200;
 
 /// Largest number of levels with a clip.
 const MOST_CLIPS: usize = 60;

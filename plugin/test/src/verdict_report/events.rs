@@ -7,7 +7,7 @@ use crate::{
     verdict::{LevelMaps, LevelVerdict, SkillTicks, TestRecord},
     verdict_report::{
         drawn::Plans,
-        heat::{Grid, SKILL_COLOURS, count_layer, path, shape, skill_layer, stacked},
+        heat::{Grid, SKILL_COLOURS, count_layer, floor as draw_floor, shape, skill_layer, start_and_goal},
         text,
     },
 };
@@ -385,18 +385,19 @@ fn floor(known: &[(&VisitedLevel, FloorPlan)], maps: &LevelMaps, grid: &Grid, sv
         *svg += &count_layer(["walls", "wall"], grid, maps, &walls, &[&[[0, known.len() as u64]], &walls]);
         return String::new();
     }
-    for (class, areas) in [("wall", &plan.walls), ("platform", &plan.platforms), ("hazard", &plan.hazards)] {
-        let areas = areas.iter().filter_map(|area| in_squares(first, area));
-        shape(class, None, &path(&stacked(areas.filter_map(|area| grid.block(area)).collect())), svg);
-    }
+    let place = |at: Vec2| (at - first.grid.origin) / first.grid.size;
+    let areas = |areas: &[Rect]| areas.iter().filter_map(|area| in_squares(first, area)).collect();
+    let plan = FloorPlan {
+        walls: areas(&plan.walls),
+        platforms: areas(&plan.platforms),
+        hazards: areas(&plan.hazards),
+        start: place(plan.start),
+        goal: place(plan.goal),
+        ..FloorPlan::default()
+    };
+    draw_floor(&plan, grid, svg);
     let mut marks = String::new();
-    let place = |at: Vec2| grid.place((at - first.grid.origin) / first.grid.size);
-    if let Some([x, y]) = place(plan.start) {
-        let _ = write!(marks, "<circle class=\"start\" cx=\"{x}\" cy=\"{y}\" r=\"7\"/>");
-    }
-    if let Some([x, y]) = place(plan.goal) {
-        shape("goal", None, &format!("M{x} {}l9 9l-9 9l-9-9z", y - 9), &mut marks);
-    }
+    start_and_goal(&plan, grid, &mut marks);
     marks
 }
 

@@ -3,11 +3,10 @@
 use crate::verdict::TestError;
 use bevy_playbot::state_hash::StateHash;
 use playbot_learner::disk;
-use playbot_report::base64;
+use playbot_report::{base64, escape::uri_path};
 use std::{
     cell::RefCell,
     collections::BTreeMap,
-    fmt::Write,
     fs, io,
     path::{Path, PathBuf},
 };
@@ -47,7 +46,7 @@ impl PictureFiles {
             let name = format!("{hash:0DIGITS$x}.png");
             let known = files.entry(name.clone()).or_insert_with(|| png.to_vec());
             if known == png {
-                return format!("{}/{name}", in_address(folder));
+                return format!("{}/{name}", uri_path(folder));
             }
             // Another picture has the same hash.
             hash = hash.wrapping_add(1);
@@ -124,19 +123,6 @@ pub fn folder_of(page: &Path) -> PathBuf {
 fn is_picture(name: &str) -> bool {
     let digit = |letter: u8| letter.is_ascii_digit() || (b'a'..=b'f').contains(&letter);
     name.strip_suffix(".png").is_some_and(|hash| hash.len() == DIGITS && hash.bytes().all(digit))
-}
-
-/// Writes a name as a part of an address (RFC 3986).
-fn in_address(name: &str) -> String {
-    let mut text = String::new();
-    for byte in name.bytes() {
-        if byte.is_ascii_alphanumeric() || b"-._~".contains(&byte) {
-            text.push(char::from(byte));
-        } else {
-            let _ = write!(text, "%{byte:02X}");
-        }
-    }
-    text
 }
 
 #[cfg(test)]

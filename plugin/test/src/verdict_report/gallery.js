@@ -7,6 +7,8 @@
   document.getElementById("gallery-section").hidden = false;
   // Sizes of a tile in pixels, rows that are drawn before they come into view, and tiles on paper.
   const [width, height, gap, ahead, most] = [168, 132, 10, 2, 300];
+  // Most letters of a name below a tile.
+  const longest = 24;
   const outcomes = ["proved-unsolvable", "bot-failed", "solved"];
   const signs = ["✗", "?", "✓"];
   const words = ["proved unsolvable", "unsolved, nothing proved", "solved"];
@@ -42,16 +44,24 @@
       }
     });
   };
+  // Names of one folder differ in their begin or in their end, so a long one loses its folders, and then its middle.
+  const short = (name) => {
+    const file = name.length > longest ? name.slice(name.lastIndexOf("/") + 1) : name;
+    if (file.length <= longest) return file;
+    const begin = Math.ceil((longest - 1) / 2);
+    return `${file.slice(0, begin)}…${file.slice(begin + 1 - longest)}`;
+  };
   const tile = (index) => {
     const level = levels[listed[index]];
     const made = document.createElement("div");
     made.id = `tile-${index}`;
-    made.className = `tile ${outcomes[level.o]}`;
+    made.className = `tile ${outcomes[level.o]}${level.f > 0 ? " found" : ""}${level.d ? " pinned" : ""}`;
     made.setAttribute("role", "option");
     made.setAttribute("aria-selected", String(index === current));
     const found = level.f > 0 ? `, ${level.f} finding${level.f === 1 ? "" : "s"}` : "";
-    made.setAttribute("aria-label", `${level.n}: ${words[level.o]}${found}, ${level.w}`);
-    made.title = level.n;
+    const pin = level.d ? `; ${level.d}` : "";
+    made.setAttribute("aria-label", `${level.n}: ${words[level.o]}${found}, ${level.w}${pin}`);
+    made.title = `${level.n}${pin}`;
     const picture = document.createElement("div");
     picture.className = "plan";
     if (level.p >= 0) {
@@ -60,12 +70,11 @@
       picture.append(canvas);
     }
     const name = document.createElement("span");
-    // The end of a path says more than its begin.
-    name.textContent = level.n.length > 22 ? `…${level.n.slice(-21)}` : level.n;
+    name.textContent = short(level.n);
     const sign = document.createElement("b");
     sign.textContent = `${signs[level.o]}${level.f > 0 ? "!" : ""} `;
     const note = document.createElement("small");
-    note.append(sign, level.w);
+    note.append(sign, `${level.w}${pin}`);
     made.append(picture, name, note);
     made.addEventListener("click", () => choose(index));
     return made;
@@ -117,7 +126,7 @@
     heading.textContent = level.n;
     const outcome = document.createElement("p");
     outcome.className = outcomes[level.o];
-    outcome.textContent = `${words[level.o]}; ${level.w}`;
+    outcome.textContent = `${words[level.o]}; ${level.w}${level.d ? `; ${level.d}` : ""}`;
     const card = rows.get(level.n)?.querySelector(".card");
     const none = document.createElement("p");
     none.textContent = "It has no details here: results.json has them.";
@@ -150,7 +159,7 @@
     const find = form.elements.words.value.trim().toLowerCase();
     const kind = form.elements.kind.value;
     const isOfKind = (level) => kind === "" || kind === outcomes[level.o] || (kind === "findings" && level.f > 0);
-    const isListed = ({ n, w }) => `${n} ${w}`.toLowerCase().includes(find);
+    const isListed = ({ n, w, d }) => `${n} ${w} ${d ?? ""}`.toLowerCase().includes(find);
     listed = levels.map((_, place) => place).filter((place) => isOfKind(levels[place]) && isListed(levels[place]));
     current = -1;
     chosen.hidden = true;

@@ -4,7 +4,10 @@
 
 use crate::{
     verdict::PlanRows,
-    verdict_report::{drawn::Plans, selection::Selection},
+    verdict_report::{
+        drawn::Plans,
+        selection::{Selection, SmallLevel},
+    },
 };
 use playbot_report::whole;
 use serde::Serialize;
@@ -26,6 +29,9 @@ struct Thumb<'a> {
     w: &'a str,
     /// Its plan among all; -1 without one.
     p: i64,
+    /// Its pins in words, if it has some.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    d: Option<&'a str>,
 }
 
 /// Writes the section of the page.
@@ -46,7 +52,8 @@ pub(crate) fn gallery(overview: &str, selection: &Selection, plans: &Plans) -> S
                 drawn.len() as i64 - 1
             })
         });
-        thumbs.push(Thumb { n: &level.title, o: level.outcome, f: level.findings, w: &level.words, p: plan });
+        let SmallLevel { title, outcome, findings, words, pin, .. } = level;
+        thumbs.push(Thumb { n: title, o: *outcome, f: *findings, w: words, p: plan, d: pin.as_deref() });
     }
     let data = serde_json::json!({ "levels": thumbs, "plans": drawn });
     let mut out = format!(
@@ -58,7 +65,7 @@ pub(crate) fn gallery(overview: &str, selection: &Selection, plans: &Plans) -> S
     }
     out += " The colour and the sign say the outcome: <b class=\"solved\">✓ solved</b>, <b class=\"bot-failed\">? unsolved, \
             nothing proved</b>, <b class=\"proved-unsolvable\">✗ proved unsolvable</b>; <b class=\"bot-failed\">!</b> marks \
-            findings. Grey are walls, black is the start, green \
+            findings, whose colour a solved level has then, too. The bar of a pinned level is dashed. Grey are walls, black is the start, green \
             the goal. Arrow keys move, Enter shows a level, Escape hides it.</p>\n\
             <div id=\"gallery\" role=\"listbox\" aria-labelledby=\"gallery-heading\" tabindex=\"0\"></div>\n\
             <div id=\"chosen\" class=\"card\" role=\"region\" aria-live=\"polite\" aria-label=\"The chosen level\" hidden></div>\n</section>\n";
@@ -71,9 +78,9 @@ pub(crate) fn gallery(overview: &str, selection: &Selection, plans: &Plans) -> S
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::verdict_report::{
-        selection::SmallLevel,
-        testing::{Garden, finding, level, record},
+    use crate::{
+        verdict::PinnedFindings,
+        verdict_report::testing::{Garden, finding, level, record},
     };
 
     #[test]
@@ -83,8 +90,8 @@ mod tests {
         let mut nasty = level(1, 0, 9, 0);
         nasty.level = "</script><b>".to_owned();
         nasty.findings = vec![finding("panic", "no")];
-        let small = [SmallLevel::of(&nasty, 1), SmallLevel::of(&level(0, 9, 9, 40), 0)];
-        let selection = Selection { levels: Vec::new(), left_out: 0, gallery: small.to_vec(), all: 5 };
+        let small = [nasty, level(0, 9, 9, 40)].map(|level| SmallLevel::of(&level, &PinnedFindings::default()));
+        let selection = Selection { gallery: small.to_vec(), all: 5, ..Selection::default() };
         let html = gallery("5 levels", &selection, &plans);
         let (_, data) = html.split_once("id=\"gallery-data\">").expect("data");
         let (data, _) = data.split_once("</script>").expect("its end");
@@ -93,7 +100,7 @@ mod tests {
         assert_eq!((&data["levels"][0]["n"], &data["levels"][0]["w"]), (&"</script><b>".into(), &"panic".into()));
         assert_eq!((&data["levels"][1]["w"], &data["levels"][1]["p"]), (&"40 ticks".into(), &0.into()));
         assert!(html.contains(" 3 other levels are not worse"), "{html}");
-        let one = Selection { levels: Vec::new(), left_out: 0, gallery: small[..1].to_vec(), all: 1 };
+        let one = Selection { gallery: small[..1].to_vec(), all: 1, ..Selection::default() };
         assert_eq!(gallery("", &one, &plans), "", "one level needs no gallery");
     }
 }

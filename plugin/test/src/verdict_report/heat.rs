@@ -2,6 +2,7 @@
 
 use crate::verdict::LevelMaps;
 use bevy::math::{Rect, Vec2};
+use playbot_harness::floor_plan::FloorPlan;
 use playbot_report::escape::escape;
 use std::{cmp::Reverse, collections::BTreeMap, fmt::Write};
 
@@ -248,6 +249,24 @@ pub(crate) fn shape(class: &str, strength: Option<&str>, path: &str, svg: &mut S
     }
     let opacity = strength.map_or_else(String::new, |strength| format!(" opacity=\"{strength}\""));
     let _ = write!(svg, "<path class=\"{class}\"{opacity} d=\"{path}\"/>");
+}
+
+/// Draws walls, platforms and hazards of a plan. Areas that are not finite are left out.
+pub(crate) fn floor(plan: &FloorPlan, grid: &Grid, svg: &mut String) {
+    for (class, areas) in [("wall", &plan.walls), ("platform", &plan.platforms), ("hazard", &plan.hazards)] {
+        let finite = areas.iter().filter(|area| area.min.is_finite() && area.max.is_finite());
+        shape(class, None, &path(&stacked(finite.filter_map(|area| grid.block(*area)).collect())), svg);
+    }
+}
+
+/// Draws start and goal of a plan, which lie above all else.
+pub(crate) fn start_and_goal(plan: &FloorPlan, grid: &Grid, svg: &mut String) {
+    if let Some([x, y]) = grid.place(plan.start) {
+        let _ = write!(svg, "<circle class=\"start\" cx=\"{x}\" cy=\"{y}\" r=\"7\"/>");
+    }
+    if let Some([x, y]) = grid.place(plan.goal) {
+        shape("goal", None, &format!("M{x} {}l9 9l-9 9l-9-9z", y - 9), svg);
+    }
 }
 
 #[cfg(test)]

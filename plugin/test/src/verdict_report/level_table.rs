@@ -1,15 +1,16 @@
 //! The table of levels, with the text above it.
 
 use crate::{
-    verdict::{Finding, LevelVerdict, TestRecord, TesterVerdict, missing_failure, rerun_commands},
+    verdict::{Finding, LevelVerdict, PinnedFindings, TestRecord, TesterVerdict, missing_failure, rerun_commands},
     verdict_report::{
         drawn::{Drawer, Drawings, Drawn, walks},
         interval,
         picture::{map_legend, map_scope},
-        selection::{Selection, problems},
+        selection::{FailedEpisode, Selection, problems},
         text, what,
     },
 };
+use playbot_harness::brief::shell_word;
 use playbot_report::{escape::escape, ticks, whole};
 use std::fmt::Write;
 
@@ -51,12 +52,12 @@ pub(crate) fn level_table(record: &TestRecord, selection: &Selection, drawings: 
     let mut drawer = Drawer::new(drawings);
     for level in &selection.levels {
         let drawn = drawer.draw(level);
-        rows += &level_row(record, level, program, drawn.as_ref());
+        rows += &level_row(record, level, selection, program, drawn.as_ref());
     }
     let pictures = drawer.pictures;
     let mut out = String::from("<section>\n<h2 id=\"levels-heading\">Levels</h2>\n<p>The worst levels come first: ");
     out += "those proved unsolvable, then the unsolved ones, then the others; among them those with the most findings, then the \
-            least solved, then the slowest.";
+            least solved, then the slowest, then those of which the smallest part was reached.";
     if selection.left_out > 0 {
         let left_out = whole(selection.left_out as f64);
         let _ = write!(out, " {left_out} other levels are not worse than the last one here; all are in results.json.");
@@ -80,7 +81,13 @@ pub(crate) fn level_table(record: &TestRecord, selection: &Selection, drawings: 
 
 /// Writes the rows of a level: its numbers, and below them its details, if it has findings or a picture. `data-v` is
 /// the sort key of a column, `data-k` the filter key of a level.
-pub(crate) fn level_row(record: &TestRecord, level: &LevelVerdict, program: &str, drawn: Option<&Drawn>) -> String {
+pub(crate) fn level_row(
+    record: &TestRecord,
+    level: &LevelVerdict,
+    selection: &Selection,
+    program: &str,
+    drawn: Option<&Drawn>,
+) -> String {
     let LevelVerdict { score, findings, .. } = level;
     let outcome = level.outcome.name();
     let found = if findings.is_empty() { "" } else { " findings" };
@@ -106,12 +113,13 @@ pub(crate) fn level_row(record: &TestRecord, level: &LevelVerdict, program: &str
         problems(level),
         detectors(level),
     );
+    let pin = selection.pinned.describe_level(level).map_or_else(String::new, |pin| format!("; {}", text(&pin)));
     if !level.is_perfect() || drawn.is_some() || level.recorded_news().is_some() {
         let _ = writeln!(
             out,
-            "<tr><td colspan=\"7\"><details><summary>{}</summary>\n<div class=\"card\">\n{}</div></details></td></tr>",
+            "<tr><td colspan=\"7\"><details><summary>{}{pin}</summary>\n<div class=\"card\">\n{}</div></details></td></tr>",
             what(level),
-            details(record, level, program, drawn)
+            details(record, level, selection, program, drawn)
         );
     }
     out + "</tbody>\n"
@@ -129,11 +137,17 @@ fn detectors(level: &LevelVerdict) -> String {
 // Details of one level.
 
 /// Writes the details of a level, with its picture if it has one.
-pub(crate) fn details(record: &TestRecord, level: &LevelVerdict, program: &str, drawn: Option<&Drawn>) -> String {
+pub(crate) fn details(
+    record: &TestRecord,
+    level: &LevelVerdict,
+    selection: &Selection,
+    program: &str,
+    drawn: Option<&Drawn>,
+) -> String {
     let mut out = String::new();
     if !level.findings.is_empty() {
         let more = level.findings.len().saturating_sub(MOST_LISTED);
-        let listed: String = level.findings.iter().take(MOST_LISTED).map(finding).collect();
+        let listed: String = level.findings.iter().take(MOST_LISTED).map(|of| finding(of, &selection.pinned)).collect();
         let more = if more > 0 { format!("<li>and {more} more</li>\n") } else { String::new() };
         let _ = write!(out, "<ul class=\"findings\">\n{listed}{more}</ul>\n");
     }
@@ -150,6 +164,9 @@ pub(crate) fn details(record: &TestRecord, level: &LevelVerdict, program: &str, 
     if let Some(missing) = missing_failure(program, record, level) {
         let _ = writeln!(out, "<p>{}.</p>", text(&missing));
     }
+    if let Some(kept) = selection.failures.get(&level.level) {
+        out += &failure(kept, selection.pinned.describe_failure(level), program);
+    }
     out += &walks(level);
     out += &testers(&level.testers);
     let commands = rerun_commands(program, record, level);
@@ -159,14 +176,28 @@ pub(crate) fn details(record: &TestRecord, level: &LevelVerdict, program: &str, 
     out
 }
 
-fn finding(finding: &Finding) -> String {
+/// Writes a kept failed episode with the command that replays it, from the folder of the page.
+fn failure(failure: &FailedEpisode, pin: Option<String>, program: &str) -> String {
+    let FailedEpisode { file, tester, end } = failure;
+    let tester = tester.as_ref().map_or_else(String::new, |tester| format!(" of {}", text(tester)));
+    let pin = pin.map_or_else(String::new, |pin| format!("; {}", text(&pin)));
+    let command = format!("{program} replay {} --window", shell_word(file));
+    format!(
+        "<p>A failed episode{tester} is kept: {}{pin}.</p>\n<pre><code>{}</code></pre>\n",
+        text(end),
+        escape(&command)
+    )
+}
+
+fn finding(finding: &Finding, pinned: &PinnedFindings) -> String {
     let tester = finding.tester.as_ref().map(|tester| escape(tester));
     let episode = finding.episode.map(|episode| format!("episode {episode}"));
     let tick = finding.tick.map(|tick| format!("tick {tick}"));
     let place: Vec<String> = [tester, episode, tick].into_iter().flatten().collect();
     let place = if place.is_empty() { String::new() } else { format!(" ({})", place.join(", ")) };
     let file = finding.file.as_ref().map_or_else(String::new, |file| format!(" <code>{}</code>", escape(file)));
-    format!("<li><b>{}</b>{place}: {}{file}</li>\n", escape(&finding.detector), text(&finding.message))
+    let pin = pinned.describe(finding).map_or_else(String::new, |pin| format!("; {}", text(&pin)));
+    format!("<li><b>{}</b>{place}: {}{pin}{file}</li>\n", escape(&finding.detector), text(&finding.message))
 }
 
 fn testers(testers: &[TesterVerdict]) -> String {
@@ -224,7 +255,7 @@ mod tests {
         let tested = TestRecord { maps: MapScope::All, ..record("default:0..0", None) };
         let plans = Plans::Known { game: &game, range: &tested.range };
         let drawings = Drawings::new(plans, PictureFiles::default(), None, 0);
-        let selection = Selection { levels: vec![level(0, 1, 2, 30)], left_out: 0, gallery: Vec::new(), all: 1 };
+        let selection = Selection { levels: vec![level(0, 1, 2, 30)], all: 1, ..Selection::default() };
         let words = level_table(&tested, &selection, &drawings, "jump");
         assert!(words.contains(WITHOUT_PLANS) && !words.contains("are kept for all levels"), "{words}");
     }

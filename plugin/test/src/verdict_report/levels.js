@@ -65,17 +65,63 @@
     button.after(clip);
     button.textContent = "Stop";
   });
-  // A scene moves while its button is on.
-  for (const button of document.querySelectorAll("button.moving")) {
-    const words = button.textContent;
-    const picture = button.previousElementSibling;
-    const still = picture.getAttribute("src");
-    button.hidden = false;
-    button.addEventListener("click", () => {
-      const moves = picture.getAttribute("src") !== still;
-      picture.src = moves ? still : picture.dataset.moving;
-      button.textContent = moves ? words : "Stop";
+  // A scene goes on or back by a tick, or plays until it is stopped. All of its ticks are parts of one picture.
+  for (const scene of document.querySelectorAll(".scene[data-film]")) {
+    const [pictures, columns, first, pause] =
+      ["pictures", "columns", "first", "pause"].map((name) => Number(scene.dataset[name]));
+    const steps = scene.querySelector(".steps");
+    const [back, play, on] = steps.querySelectorAll("button");
+    const tick = steps.querySelector("output");
+    let film = null;
+    let shown = Number(scene.dataset.shown);
+    let timer = 0;
+    const show = (number) => {
+      if (!film) {
+        const frame = document.createElement("div");
+        frame.className = "film";
+        frame.style.aspectRatio = scene.dataset.ratio;
+        film = document.createElement("img");
+        film.src = scene.dataset.film;
+        film.style.width = `${100 * columns}%`;
+        frame.append(film);
+        scene.querySelector("img").replaceWith(frame);
+      }
+      shown = Math.min(Math.max(number, 0), pictures - 1);
+      film.style.left = `${-100 * (shown % columns)}%`;
+      film.style.top = `${-100 * Math.floor(shown / columns)}%`;
+      film.alt = `The game in tick ${first + shown}`;
+      tick.textContent = `tick ${first + shown}`;
+    };
+    const stop = () => {
+      clearInterval(timer);
+      timer = 0;
+      play.textContent = "Play";
+      tick.removeAttribute("aria-live");
+    };
+    const step = (ticks) => {
+      stop();
+      show(shown + ticks);
+    };
+    back.addEventListener("click", () => step(-1));
+    on.addEventListener("click", () => step(1));
+    steps.addEventListener("keydown", (event) => {
+      const ticks = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+      if (!ticks) return;
+      event.preventDefault();
+      step(ticks);
     });
+    play.addEventListener("click", () => {
+      if (timer) {
+        stop();
+        return;
+      }
+      // A screen reader would read out every tick.
+      tick.setAttribute("aria-live", "off");
+      play.textContent = "Stop";
+      show(!film || shown === pictures - 1 ? 0 : shown);
+      timer = setInterval(() => show((shown + 1) % pictures), pause);
+    });
+    steps.hidden = false;
   }
   filter();
 })();

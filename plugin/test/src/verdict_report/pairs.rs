@@ -5,12 +5,12 @@ use crate::{
     verdict_report::{
         drawn::Drawings,
         ends,
-        heat::{Grid, path, shape, stacked},
+        heat::{Grid, floor, shape, start_and_goal},
         reach::Reached,
         text,
     },
 };
-use bevy::math::{Rect, Vec2};
+use bevy::math::Vec2;
 use playbot_harness::floor_plan::FloorPlan;
 use playbot_report::{counted, escape::escape};
 use std::{
@@ -167,7 +167,8 @@ fn keep_worst(changed: &mut Vec<Pair>) {
 /// Returns the changes of a comparison by level.
 fn changed_verdicts(comparison: &Comparison) -> BTreeMap<&str, Vec<(ChangeKind, String)>> {
     let mut changes: BTreeMap<&str, Vec<(ChangeKind, String)>> = BTreeMap::new();
-    let Comparison { unsolvable, harder, easier, new_findings, gone_findings, unreached, .. } = comparison;
+    let Comparison { unsolvable, harder, easier, new_findings, gone_findings, unreached, other_testers, .. } =
+        comparison;
     for (kind, list) in
         [(ChangeKind::Unsolvable, unsolvable), (ChangeKind::Harder, harder), (ChangeKind::Easier, easier)]
     {
@@ -183,6 +184,10 @@ fn changed_verdicts(comparison: &Comparison) -> BTreeMap<&str, Vec<(ChangeKind, 
             let words = format!("{what}: {}", without_level(&change.level, change));
             changes.entry(&change.level).or_default().push((kind, words));
         }
+    }
+    for change in other_testers {
+        let words = without_level(&change.level, change);
+        changes.entry(&change.level).or_default().push((ChangeKind::Outcome, words));
     }
     for change in unreached {
         let words = without_level(&change.level, change);
@@ -261,11 +266,7 @@ impl Side {
         let mut svg =
             format!("<svg class=\"level\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{label}\">");
         svg += &reached.map_or_else(String::new, |reached| reached.svg(&grid, MOST_REACH));
-        for (class, areas) in [("wall", &plan.walls), ("platform", &plan.platforms), ("hazard", &plan.hazards)] {
-            let finite = areas.iter().filter(|area| area.min.is_finite() && area.max.is_finite());
-            let blocks = finite.filter_map(|area: &Rect| grid.block(*area)).collect();
-            shape(class, None, &path(&stacked(blocks)), &mut svg);
-        }
+        floor(plan, &grid, &mut svg);
         let is_solved = self.outcome == LevelOutcome::Solved;
         let class = if is_solved { "way" } else { "way lost-way" };
         let places: Vec<Option<[i32; 2]>> = positions.iter().map(|position| grid.place(*position)).collect();
@@ -274,12 +275,7 @@ impl Side {
         if let Some([x, y]) = places.last().copied().flatten().filter(|_| !is_solved) {
             shape("mark", None, &format!("M{} {}l14 14m0-14l-14 14", x - 7, y - 7), &mut svg);
         }
-        if let Some([x, y]) = grid.place(plan.start) {
-            let _ = write!(svg, "<circle class=\"start\" cx=\"{x}\" cy=\"{y}\" r=\"7\"/>");
-        }
-        if let Some([x, y]) = grid.place(plan.goal) {
-            shape("goal", None, &format!("M{x} {}l9 9l-9 9l-9-9z", y - 9), &mut svg);
-        }
+        start_and_goal(plan, &grid, &mut svg);
         svg += "</svg>";
         (svg.len() <= MOST_BYTES).then_some(svg)
     }
@@ -348,7 +344,7 @@ fn common(before: &Side, now: &Side) -> [Vec<bool>; 2] {
 mod tests {
     use super::*;
     use crate::{
-        verdict::{FindingChange, PlanRows},
+        verdict::{FindingChange, PlanRows, SolvedByOthers},
         verdict_report::{
             drawn::Plans,
             files::PictureFiles,
@@ -441,6 +437,11 @@ mod tests {
         let lost = [along(0, false, &[65, 66])];
         let html = compared([&tested, &seeded], &before, &lost, &none);
         assert!(html.contains("solved before, bot-failed now, which may be chance"), "{html}");
+        let gone = SolvedByOthers { level: "hard:0".to_owned(), before: true, by: vec!["search".to_owned()] };
+        let gone = Comparison { other_testers: vec![gone], ..none };
+        let html = compared([&tested, &others], &before, &lost, &gone);
+        assert!(html.contains("solved before by search alone, and the testers differ<"), "{html}");
+        assert!(!html.contains("may be chance"), "{html}");
     }
 
     #[test]

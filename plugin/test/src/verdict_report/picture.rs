@@ -1,10 +1,10 @@
-//! Small drawings of levels: floor plan, ends of episodes, and maps.
+//! Small drawings of levels: floor plan, ends of episodes, and maps, or the path of an agent up to a finding.
 
 use crate::{
     verdict::{END_SQUARES, LevelVerdict, MapScope, SquareEnds},
     verdict_report::{
         ends,
-        heat::{Block, Grid, layers, path, shape, stacked},
+        heat::{Block, Grid, floor, layers, path, shape, start_and_goal},
         reach::Reached,
     },
 };
@@ -25,6 +25,18 @@ const MOST_SQUARES: usize = 40;
 /// Opacities of squares, from few to many ends.
 const STRENGTHS: [&str; 4] = [".3", ".5", ".7", ".9"];
 
+/// Most points of a path. Of more, evenly spaced ones are drawn.
+const MOST_POINTS: usize = 300;
+
+/// Largest size of a drawing, bytes: a page has up to 50 of them.
+const MOST_PATH_BYTES: usize = 12_000;
+
+/// Room for a path that leaves the plan, as a share of its longer side.
+const BEYOND: f32 = 0.1;
+
+/// Half of the cross on a path. It is seen in a drawing of a quarter of its size, too.
+const CROSS: i32 = 27;
+
 /// Returns the drawing as an SVG element in the colours of the page, and the ends of its axes in words. `None` for a plan
 /// without extent, or with too many parts for a page with many levels.
 ///
@@ -42,10 +54,7 @@ pub(crate) fn picture(plan: &FloorPlan, level: &LevelVerdict, reached: Option<&R
     let reached = reached.map(|reached| reached.svg(&grid, MOST_REACH)).filter(|reached| !reached.is_empty());
     let reached = reached.map_or_else(String::new, |reached| format!("<g class=\"map ends reach\">{reached}</g>"));
     svg += &reached;
-    for (class, areas) in [("wall", &plan.walls), ("platform", &plan.platforms), ("hazard", &plan.hazards)] {
-        let blocks = areas.iter().filter(|area| is_finite(area)).filter_map(|area| grid.block(*area));
-        shape(class, None, &path(&stacked(blocks.collect())), &mut svg);
-    }
+    floor(plan, &grid, &mut svg);
     let mut squares: Vec<(Block, &SquareEnds)> =
         level.ends.iter().filter_map(|end| Some((square(&grid, extent, side, end)?, end))).collect();
     squares.sort_by_key(|(_, end)| Reverse(end.lost.saturating_add(end.timed_out)));
@@ -57,12 +66,7 @@ pub(crate) fn picture(plan: &FloorPlan, level: &LevelVerdict, reached: Option<&R
     svg += "</g>";
     let maps = level.maps.as_ref().map_or_else(String::new, |maps| layers(&grid, maps));
     svg += &maps;
-    if let Some([x, y]) = grid.place(plan.start) {
-        let _ = write!(svg, "<circle class=\"start\" cx=\"{x}\" cy=\"{y}\" r=\"7\"/>");
-    }
-    if let Some([x, y]) = grid.place(plan.goal) {
-        shape("goal", None, &format!("M{x} {}l9 9l-9 9l-9-9z", y - 9), &mut svg);
-    }
+    start_and_goal(plan, &grid, &mut svg);
     svg += "</svg>";
     (svg.len() - maps.len() - reached.len() <= MOST_BYTES).then(|| (svg, scales(extent)))
 }
@@ -110,10 +114,6 @@ fn marks(squares: &[(Block, &SquareEnds)], svg: &mut String) {
     }
     shape("mark", None, &crosses, svg);
     shape("mark", None, &bars, svg);
-}
-
-fn is_finite(area: &Rect) -> bool {
-    area.min.is_finite() && area.max.is_finite()
 }
 
 // Legend of the pictures.
@@ -180,6 +180,50 @@ pub(crate) fn map_scope(scope: MapScope) -> &'static str {
         }
         MapScope::All => " Maps of where agents went are kept for all levels.",
     }
+}
+
+/// Returns the drawing of a plan with the path of an agent up to a finding, in the colours of the page, with a cross at `cross`, or else at the last position.
+/// `None` without a position, or for a plan without extent or with too many parts.
+pub(crate) fn plan_with_path(
+    plan: &FloorPlan,
+    positions: &[[f32; 2]],
+    cross: Option<[f32; 2]>,
+    label: &str,
+) -> Option<String> {
+    let positions: Vec<Vec2> = positions.iter().map(|at| Vec2::from(*at)).filter(|at| at.is_finite()).collect();
+    let last = positions.last()?;
+    let grid = Grid::new(with_room(plan.bounds, &positions))?;
+    let [width, height] = grid.size();
+    let mut svg =
+        format!("<svg class=\"level\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{}\">", escape(label));
+    floor(plan, &grid, &mut svg);
+    let every = positions.len().div_ceil(MOST_POINTS);
+    let points = positions.iter().step_by(every).chain([last]);
+    let mut places: Vec<[i32; 2]> = points.filter_map(|at| grid.place(*at)).collect();
+    places.dedup();
+    let mut path = String::new();
+    for [x, y] in &places {
+        // Writing into a string cannot fail.
+        let _ = write!(path, "{}{x} {y}", if path.is_empty() { 'M' } else { 'L' });
+    }
+    shape("way", None, &path, &mut svg);
+    start_and_goal(plan, &grid, &mut svg);
+    let cross = cross.map(Vec2::from).filter(|at| at.is_finite()).and_then(|at| grid.place(at));
+    if let Some([x, y]) = cross.or(places.last().copied()) {
+        let whole = 2 * CROSS;
+        let cross = format!("M{} {}l{whole} {whole}m0-{whole}l-{whole} {whole}", x - CROSS, y - CROSS);
+        // A rim in the colour of the page sets it off from all that it lies on.
+        shape("cross rim", None, &cross, &mut svg);
+        shape("cross", None, &cross, &mut svg);
+    }
+    svg += "</svg>";
+    (svg.len() <= MOST_PATH_BYTES).then_some(svg)
+}
+
+/// Returns the drawn area: the plan, with room for a path that leaves it.
+fn with_room(bounds: Rect, positions: &[Vec2]) -> Rect {
+    let most = bounds.inflate(BEYOND * bounds.size().max_element());
+    positions.iter().fold(bounds, |extent, at| extent.union_point(at.max(most.min).min(most.max)))
 }
 
 #[cfg(test)]
@@ -272,5 +316,48 @@ mod tests {
         assert_eq!(picture(&plan, &level(0, 0, 1, 0), None), None);
         let flat = FloorPlan { bounds: Rect::default(), ..garden() };
         assert_eq!(picture(&flat, &level(0, 0, 1, 0), None), None);
+    }
+
+    #[test]
+    fn the_path_goes_from_the_first_position_to_a_cross() {
+        let path: Vec<[f32; 2]> = (0..1000_u16).map(|tick| [1.5 + f32::from(tick) * 0.05, 1.5]).collect();
+        let svg = plan_with_path(&garden(), &path, None, "the <path>").expect("a plan");
+        assert!(svg.contains("aria-label=\"the &lt;path&gt;\"") && svg.len() <= MOST_PATH_BYTES, "{svg}");
+        let (_, drawn) = svg.split_once("<path class=\"way\" d=\"M").expect("a path");
+        let (drawn, _) = drawn.split_once('"').expect("its end");
+        let points: Vec<(i32, i32)> = drawn
+            .split('L')
+            .map(|point| {
+                let (x, y) = point.split_once(' ').expect("two numbers");
+                (x.parse().expect("a number"), y.parse().expect("a number"))
+            })
+            .collect();
+        assert!(points.len() > 100 && points.len() <= MOST_POINTS + 1, "{}", points.len());
+        assert!(points.is_sorted_by_key(|(x, _)| *x) && points.iter().all(|(_, y)| *y == points[0].1), "{points:?}");
+        let (x, y) = points[points.len() - 1];
+        let cross = |x: i32, y: i32| format!("\" d=\"M{} {}l54 54m0-54l-54 54\"/>", x - 27, y - 27);
+        assert!(svg.contains(&format!("<path class=\"cross rim{0}<path class=\"cross{0}", cross(x, y))), "{svg}");
+        let earlier = plan_with_path(&garden(), &path, Some(path[400]), "").expect("a plan");
+        let (x, y) = points[100];
+        assert!(earlier.contains(&cross(x, y)) && earlier.matches("class=\"cross").count() == 2, "{earlier}");
+        assert!(svg.contains("class=\"start\"") && svg.contains("class=\"goal\""));
+    }
+
+    #[test]
+    fn what_cannot_be_drawn_has_no_plan() {
+        let garden = garden();
+        assert_eq!(plan_with_path(&garden, &[], None, ""), None);
+        assert_eq!(plan_with_path(&garden, &[[f32::NAN, 1.0]], None, ""), None);
+        assert_eq!(plan_with_path(&FloorPlan::default(), &[[1.0, 1.0]], None, ""), None, "it has no extent");
+        let bush = |number: u16| {
+            let at = Vec2::new(f32::from(number % 60) + 0.5, f32::from(number / 60) * 0.3 + 0.5);
+            Rect::from_center_size(at, Vec2::splat(0.05))
+        };
+        let crowded = FloorPlan { walls: (0..3_000).map(bush).collect(), ..garden };
+        assert_eq!(plan_with_path(&crowded, &[[1.0, 1.0]], None, ""), None, "it would be too large");
+        // Far beyond the plan is at its border.
+        let svg = plan_with_path(&FloorPlan { walls: Vec::new(), ..crowded }, &[[1.0, 1.0], [1e9, -1e9]], None, "")
+            .expect("a plan");
+        assert!(svg.len() < 2_000, "{svg}");
     }
 }

@@ -98,6 +98,11 @@ impl Reached {
         self
     }
 
+    /// Returns the share of the squares that were reached, among those that no wall cuts off from the start or the goal.
+    pub fn share(&self) -> f64 {
+        self.reached.len() as f64 / (self.reached.len() + self.missed.len()).max(1) as f64
+    }
+
     /// Describes the squares that were not reached, without a full stop.
     pub fn words(&self) -> String {
         let who = if self.is_explored { "Neither a tester nor an explorer" } else { "No tester" };
@@ -193,6 +198,7 @@ mod tests {
                  <path class=\"missed\" {missed}/><path class=\"hatched\" fill=\"url(#hatch)\" {missed}/>"
             )
         );
+        assert_eq!(reached.share(), 3.0 / 7.0);
         // Of a pair of squares of which one was reached, the pair was.
         let coarse = reached.svg(&grid(), 250);
         assert!(coarse.contains("\"reached\" d=\"M0 0h160v80h-160zM160 0h160v80h-160z\""), "{coarse}");

@@ -1,7 +1,14 @@
 //! The levels of the page, the worst ones first.
 
-use crate::verdict::{LevelOutcome, LevelVerdict, ResultLines, TestError};
-use std::{cmp::Ordering, path::Path};
+use crate::{
+    findings::{Date, FINDINGS, LOST, NOT_SOLVED, StoredFinding, list_findings},
+    verdict::{LevelOutcome, LevelVerdict, PinnedFindings, ResultLines, TestError},
+};
+use std::{
+    cmp::Ordering,
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
+};
 
 /// Largest number of levels in the table: a longer page would open slowly. All levels are in `results.json`.
 const MOST_LEVELS: usize = 2_000;
@@ -10,6 +17,7 @@ const MOST_LEVELS: usize = 2_000;
 const MOST_THUMBS: usize = 10_000;
 
 /// Levels of a test, the worst ones first.
+#[derive(Default)]
 pub struct Selection {
     /// The levels of the table.
     pub levels: Vec<LevelVerdict>,
@@ -19,17 +27,33 @@ pub struct Selection {
     pub gallery: Vec<SmallLevel>,
     /// Number of all levels.
     pub all: u64,
+    /// Findings that do not count for a while.
+    pub pinned: PinnedFindings,
+    /// The failed episodes that were kept, by the levels of the table.
+    pub failures: BTreeMap<String, FailedEpisode>,
+}
+
+/// A failed episode in a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FailedEpisode {
+    /// Its file, relative to the folder of the results.
+    pub file: String,
+    /// The tester, if it is known.
+    pub tester: Option<String>,
+    /// Its end in words.
+    pub end: String,
 }
 
 impl Selection {
     /// Reads the results in a folder, and calls `each` for each level. Memory does not grow with their number.
     pub fn read(folder: &Path, each: &mut dyn FnMut(&LevelVerdict)) -> Result<Self, TestError> {
         let mut lines = ResultLines::open(folder)?;
+        let pinned = PinnedFindings::read(folder, Date::today())?;
         let (mut levels, mut gallery, mut all) = (Vec::new(), Vec::new(), 0_u64);
         while let Some(level) = lines.next_level()? {
             all += 1;
             each(&level);
-            gallery.push((Standing::of(&level), SmallLevel::of(&level, problems(&level))));
+            gallery.push((Standing::of(&level), SmallLevel::of(&level, &pinned)));
             if gallery.len() >= 2 * MOST_THUMBS {
                 keep_worst_small(&mut gallery);
             }
@@ -41,8 +65,55 @@ impl Selection {
         keep_worst(&mut levels);
         keep_worst_small(&mut gallery);
         let left_out = all - levels.len() as u64;
-        Ok(Self { levels, left_out, gallery: gallery.into_iter().map(|(_, level)| level).collect(), all })
+        let gallery = gallery.into_iter().map(|(_, level)| level).collect();
+        let failures = failures(folder, &levels);
+        Ok(Self { levels, left_out, gallery, all, pinned, failures })
     }
+
+    /// Orders levels that are otherwise equally bad by their share of reached squares, the smallest first. Levels without a
+    /// share come after those with one.
+    pub fn order_by_reach(&mut self, share: &dyn Fn(&LevelVerdict) -> Option<f64>) {
+        let shares: BTreeMap<u64, f64> =
+            self.levels.iter().filter_map(|level| Some((level.index, share(level)?))).collect();
+        let share_of = |level: &LevelVerdict| shares.get(&level.index).copied().unwrap_or(f64::INFINITY);
+        self.levels.sort_by(|one, other| {
+            let [first, second] = [one, other].map(Standing::of);
+            first
+                .worse_apart_from_number(&second)
+                .then_with(|| share_of(one).total_cmp(&share_of(other)))
+                .then_with(|| one.index.cmp(&other.index))
+        });
+        // The gallery begins with the levels of the table, in the same order.
+        let places: BTreeMap<u64, usize> =
+            self.levels.iter().enumerate().map(|(place, level)| (level.index, place)).collect();
+        self.gallery.sort_by_key(|small| places.get(&small.index).copied().unwrap_or(usize::MAX));
+    }
+}
+
+/// Returns the failed episodes in the folder of a test that were kept of these levels. A file that cannot be read is left
+/// out: `playbot review` names it.
+fn failures(folder: &Path, levels: &[LevelVerdict]) -> BTreeMap<String, FailedEpisode> {
+    let failed = levels.iter().filter(|level| level.outcome == LevelOutcome::BotFailed);
+    let failed: BTreeSet<&str> = failed.map(|level| level.level.as_str()).collect();
+    if failed.is_empty() {
+        return BTreeMap::new();
+    }
+    let found = levels.iter().flat_map(|level| &level.findings).filter_map(|finding| finding.file.as_ref());
+    let found: BTreeSet<&str> = found.map(String::as_str).collect();
+    let mut failures = BTreeMap::new();
+    for (name, path) in list_findings(folder).unwrap_or_default() {
+        let file = format!("{FINDINGS}/{name}.finding");
+        // A recording is read only where it may be a failed episode. Files beside the results are not of the test.
+        if found.contains(file.as_str()) || path != folder.join(&file) {
+            continue;
+        }
+        let Ok(StoredFinding { head, .. }) = StoredFinding::read(&path) else { continue };
+        if [LOST, NOT_SOLVED].contains(&head.detector.as_str()) && failed.contains(head.level.as_str()) {
+            let (tester, end) = (head.tester, head.message);
+            failures.entry(head.level).or_insert(FailedEpisode { file, tester, end });
+        }
+    }
+    failures
 }
 
 fn keep_worst(levels: &mut Vec<LevelVerdict>) {
@@ -76,13 +147,16 @@ impl Standing {
     /// Orders by the outcome, from proved unsolvable to solved, then by more findings, fewer solved episodes, slower ones,
     /// and the order in the range. So no two levels are equal, and shards joined in any order give the same page.
     fn worst_first(&self, other: &Self) -> Ordering {
+        self.worse_apart_from_number(other).then_with(|| self.index.cmp(&other.index))
+    }
+
+    fn worse_apart_from_number(&self, other: &Self) -> Ordering {
         let share = |a: &Self, b: &Self| u128::from(a.solved) * u128::from(b.episodes);
         let outcomes = self.outcome.cmp(&other.outcome);
         outcomes
             .then_with(|| other.problems.cmp(&self.problems))
             .then_with(|| share(self, other).cmp(&share(other, self)))
             .then_with(|| other.ticks.total_cmp(&self.ticks))
-            .then_with(|| self.index.cmp(&other.index))
     }
 }
 
@@ -104,11 +178,14 @@ pub struct SmallLevel {
     pub findings: usize,
     /// A few words about it.
     pub words: String,
+    /// Its pins in words, if it has some.
+    pub pin: Option<String>,
 }
 
 impl SmallLevel {
-    /// Takes what is shown of a level with so many findings.
-    pub fn of(level: &LevelVerdict, findings: usize) -> Self {
+    /// Takes what is shown of a level.
+    pub fn of(level: &LevelVerdict, pinned: &PinnedFindings) -> Self {
+        let findings = problems(level);
         let (solved, episodes) = (level.score.solved, level.score.episodes);
         let share = || format!("{solved} of {episodes}");
         let words = match (level.findings.first(), level.score.ticks) {
@@ -117,14 +194,20 @@ impl SmallLevel {
             (None, Some(ticks)) if solved == episodes => format!("{} ticks", playbot_report::ticks(ticks.median)),
             (None, _) => share(),
         };
-        Self { index: level.index, title: level.title(), outcome: level.outcome as u8, findings, words }
+        let (title, outcome, pin) = (level.title(), level.outcome as u8, pinned.describe_level(level));
+        Self { index: level.index, title, outcome, findings, words, pin }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::verdict_report::testing::{finding, level, record, tested};
+    use crate::{
+        findings::FindingHead,
+        verdict::Finding,
+        verdict_report::testing::{finding, keep, level, record, tested},
+    };
+    use std::fs;
 
     #[test]
     fn the_outcome_comes_first_then_findings_then_failures_then_slow_levels_then_the_number() {
@@ -152,6 +235,50 @@ mod tests {
         let selection = Selection::read(&folder, &mut |_| {}).expect("results");
         let order: Vec<u64> = selection.levels.iter().map(|level| level.index).collect();
         assert_eq!((order, selection.left_out), (vec![6, 7, 8, 2, 9, 4, 3, 1, 0, 5], 0));
+    }
+
+    #[test]
+    fn equally_bad_levels_are_ordered_by_what_was_reached() {
+        let parent = tempfile::tempdir().expect("a folder");
+        let levels: Vec<LevelVerdict> = (0..5).map(|index| level(index, u64::from(index == 4), 2, 10)).collect();
+        let folder = tested(parent.path(), "whole", &record("hard:0..4", None), &levels);
+        let mut selection = Selection::read(&folder, &mut |_| {}).expect("results");
+        // The second one is unknown, and the solved one stays the last.
+        selection.order_by_reach(&|level| [Some(0.7), None, Some(0.2), Some(0.7), Some(0.0)][level.index as usize]);
+        let order: Vec<u64> = selection.levels.iter().map(|level| level.index).collect();
+        let gallery: Vec<u64> = selection.gallery.iter().map(|small| small.index).collect();
+        assert_eq!((&order[..], gallery), (&[2, 0, 3, 1, 4][..], order.clone()));
+    }
+
+    #[test]
+    fn kept_failed_episodes_are_those_of_the_levels_that_no_tester_solved() {
+        let parent = tempfile::tempdir().expect("a folder");
+        let folder = parent.path();
+        let keep = |name: &str, level: &str, detector: &str| {
+            let tester = Some("random".to_owned());
+            keep(
+                folder,
+                name,
+                FindingHead { tester, ..FindingHead::new(level, detector, "time was up after 30 ticks") },
+            );
+        };
+        keep("a", "hard:0", NOT_SOLVED);
+        keep("b", "hard:1", LOST);
+        keep("c", "hard:2", "stuck");
+        keep("d", "hard:2", LOST);
+        keep("e", "hard:9", LOST);
+        fs::write(folder.join(FINDINGS).join("f.finding"), "damaged").expect("writable");
+        let found = Finding { file: Some(format!("{FINDINGS}/d.finding")), ..finding(LOST, "a finding") };
+        let levels =
+            [level(0, 0, 2, 0), level(1, 1, 2, 10), LevelVerdict { findings: vec![found], ..level(2, 0, 2, 0) }];
+        let kept = failures(folder, &levels);
+        let episode = FailedEpisode {
+            file: "findings/a.finding".to_owned(),
+            tester: Some("random".to_owned()),
+            end: "time was up after 30 ticks".to_owned(),
+        };
+        assert_eq!(kept, BTreeMap::from([("hard:0".to_owned(), episode)]));
+        assert!(failures(&folder.join("none"), &levels).is_empty() && failures(folder, &levels[1..2]).is_empty());
     }
 
     #[test]

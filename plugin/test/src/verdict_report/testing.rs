@@ -1,11 +1,18 @@
 //! Levels, results and a game for unit tests.
 
-use crate::verdict::{
-    Earlier, EpisodeScore, Finding, FinishTime, LevelOutcome, LevelVerdict, MapScope, TestFolder, TestRecord,
-    TesterRecord, TesterVerdict, wilson,
+use crate::{
+    findings::{FINDINGS, FindingHead, Pin, Pins, StoredFinding},
+    verdict::{
+        Earlier, EpisodeScore, Finding, FinishTime, LevelOutcome, LevelVerdict, MapScope, TestFolder, TestRecord,
+        TesterRecord, TesterVerdict, wilson,
+    },
 };
 use bevy::prelude::*;
-use bevy_playbot::{action::ActionSpace, observation::ObservationSpace};
+use bevy_playbot::{
+    action::ActionSpace,
+    demo::file::{Decider, DemoActions, DemoEpisode, DemoHeader, EpisodeActions},
+    observation::ObservationSpace,
+};
 use playbot_harness::{
     detector::LevelProof,
     floor_plan::FloorPlan,
@@ -13,6 +20,7 @@ use playbot_harness::{
 };
 use std::{
     collections::BTreeMap,
+    fs,
     path::{Path, PathBuf},
 };
 
@@ -130,6 +138,34 @@ pub(crate) fn finding(detector: &str, message: &str) -> Finding {
         message: message.to_owned(),
         file: None,
         settings: Vec::new(),
+    }
+}
+
+/// Writes an episode of two ticks with this head into `findings`, in the folder of a test.
+pub(crate) fn keep(folder: &Path, name: &str, head: FindingHead) {
+    let header = DemoHeader::new("garden", 1, "hard", 15.0, DemoActions::Discrete(2));
+    let mut episode = DemoEpisode::new(0, header.actions);
+    episode.actions = EpisodeActions::Discrete(vec![1, 0]);
+    (episode.rewards, episode.state_hashes) = (vec![0.0; 2], vec![1, 2]);
+    episode.deciders = vec![Decider::Bot; 2];
+    let folder = folder.join(FINDINGS);
+    fs::create_dir_all(&folder).expect("writable");
+    StoredFinding { header, head, episode }.write(&folder.join(format!("{name}.finding"))).expect("writable");
+}
+
+/// Makes a finding with a file.
+pub(crate) fn in_file(name: &str) -> Finding {
+    Finding { file: Some(format!("{FINDINGS}/{name}.finding")), ..finding("panic", name) }
+}
+
+/// Pins findings of these names in the folder of a test, whose files are no findings.
+pub(crate) fn pin(folder: &Path, names: &[&str], until: &str) {
+    fs::create_dir_all(folder.join(FINDINGS)).expect("writable");
+    for name in names {
+        fs::write(folder.join(FINDINGS).join(format!("{name}.finding")), "").expect("writable");
+        let reason = "drawn anew in spring".to_owned();
+        let pin = Pin { finding: (*name).to_owned(), reason, until: until.parse().expect("a day") };
+        Pins::add(folder, &pin).expect("writable");
     }
 }
 

@@ -1,14 +1,14 @@
 //! Tests of the whole page.
 
 use crate::{
-    findings::{RecordedCourse, testing::course},
+    findings::{FindingHead, NOT_SOLVED, RecordedCourse, testing::course},
     verdict::{
         CommonStop, Comparison, EpisodePath, FindingChange, LevelMaps, LevelVerdict, MapScope, Places, Shard,
         SkillTicks, SquareEnds, StopKind, TestError, TestRecord, TesterVerdict, TooShort, merge,
     },
     verdict_report::{
         HtmlReport, REPORT, STYLE, html,
-        testing::{Garden, finding, level, record, tested},
+        testing::{Garden, finding, in_file, keep, level, pin, record, tested},
         write_html,
     },
 };
@@ -94,6 +94,44 @@ fn common_stops_and_levels_that_are_solved_in_their_first_tick_are_on_the_page()
                  position of the entity with `Player&lt;T&gt;`";
     assert!(html.contains(words), "{html}");
     assert!(html.contains("<p>1 level is solved in its first tick: hard:1.</p>"), "{html}");
+}
+
+#[test]
+fn pins_are_in_the_gallery_and_in_the_rows_of_levels() {
+    let parent = tempfile::tempdir().expect("a folder");
+    let with = |index: u64, names: &[&str]| LevelVerdict {
+        findings: names.iter().map(|name| in_file(name)).collect(),
+        ..level(index, 9, 9, 5)
+    };
+    let levels = [with(0, &["a"]), with(1, &["a", "b"]), with(2, &["b"])];
+    let folder = tested(parent.path(), "whole", &record("hard:0..2", None), &levels);
+    pin(&folder, &["a"], "2999-01-31");
+    let page = html(&folder, &PLAIN).expect("results");
+    let words = "pinned until 2999-01-31: drawn anew in spring";
+    for words in [
+        format!("<summary>panic: a; {words}</summary>"),
+        format!("<summary>panic: a (and 1 more); panic {words}</summary>"),
+        "<summary>panic: b</summary>".to_owned(),
+        format!("\"d\":\"{words}\""),
+        format!("<li><b>panic</b> (random, episode 0, tick 7): a; {words} <code>"),
+        format!("<p><b>{words}</b></p>"),
+    ] {
+        assert!(page.contains(&words), "{words} in {page}");
+    }
+    assert_eq!(page.matches("<article class=\"finding pinned\">").count(), 2, "{page}");
+}
+
+#[test]
+fn a_kept_failed_episode_is_at_its_level_with_the_command_that_replays_it() {
+    let parent = tempfile::tempdir().expect("a folder");
+    let folder = tested(parent.path(), "whole", &record("hard:0..0", None), &[level(0, 0, 9, 0)]);
+    let tester = Some("<random>".to_owned());
+    let head = FindingHead { tester, ..FindingHead::new("hard:0", NOT_SOLVED, "time was up after 30 ticks") };
+    keep(&folder, "a b", head);
+    let page = html(&folder, &PLAIN).expect("results");
+    let words = "<p>A failed episode of &lt;random&gt; is kept: time was up after 30 ticks.</p>\n\
+                 <pre><code>playbot replay &#39;findings/a b.finding&#39; --window</code></pre>";
+    assert!(page.contains(words), "{page}");
 }
 
 #[test]
@@ -288,9 +326,12 @@ fn wide_tables_scroll_within_themselves_and_keep_their_first_column() {
             .map(|words| format!("<div class=\"{words}\" tabindex=\"0\">"));
     assert_eq!(frames, [all.as_str(), levels.as_str(), own, own], "all testers, levels, and the testers of each level");
     assert_eq!(html.matches("<div").count(), html.matches("</div>").count());
-    for rule in
-        [".table { overflow-x: auto;", ".levels { overflow-x: auto;", "th:first-child { position: sticky; left: 0;"]
-    {
+    for rule in [
+        ".table { overflow-x: auto;",
+        ".levels { overflow-x: auto;",
+        "no-repeat local",
+        "th:first-child { position: sticky; left: 0;",
+    ] {
         assert!(html.contains(rule), "{rule}");
     }
 }

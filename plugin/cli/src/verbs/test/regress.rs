@@ -12,10 +12,10 @@ use playbot_report::{PlainTable, counted};
 use playbot_test::{
     detectors::{ALWAYS, DetectorChoice, DetectorError, DetectorInfo, Detectors, Pars, TIMING, forget_timing, list},
     findings::{
-        Checks, Date, FindingStatus, LOST, NOT_SOLVED, PinState, Pins, Regress, RegressRow, Regression, StoredFinding,
-        list_findings, regress_until,
+        Checks, Date, FindingStatus, PinState, Pins, Regress, RegressRow, Regression, StoredFinding, list_findings,
+        regress_until,
     },
-    verdict::{Finding, LevelPars, ResultLines, maps::level_name},
+    verdict::{LevelPars, PinnedFindings, ResultLines, maps::level_name},
 };
 use std::{
     collections::BTreeSet,
@@ -187,40 +187,17 @@ impl PinnedLevels {
             return Ok(Self::default());
         }
         let files = list_findings(folder).unwrap_or_default();
-        let mut words = Vec::new();
-        let mut holds = BTreeSet::new();
-        for (name, _) in &files {
-            match pins.of(name, today) {
-                Some(pin) if pin.expired => words.push(expired(name, &pin)),
-                Some(_) => drop(holds.insert(name.as_str())),
-                None => {}
-            }
-        }
-        // Failed episodes are kept for levels without findings.
-        let failed = files.iter().filter(|(name, _)| holds.contains(name.as_str()));
-        let failed = failed.filter_map(|(_, path)| StoredFinding::read(path).ok());
-        let failed: BTreeSet<String> = failed
-            .filter(|finding| [LOST, NOT_SOLVED].contains(&finding.head.detector.as_str()))
-            .map(|finding| finding.head.level)
-            .collect();
-        let is_pinned = |finding: &Finding| {
-            let name = finding.file.as_ref().and_then(|file| Path::new(file).file_stem()?.to_str());
-            name.is_some_and(|name| holds.contains(name))
-        };
-        let (mut excused, mut lines) = (0, ResultLines::open(folder)?);
-        while let Some(level) = lines.next_level()? {
-            let is_excused = match level.findings.as_slice() {
-                [] => failed.contains(&level.level),
-                findings => findings.iter().all(is_pinned),
-            };
-            excused += u64::from(!level.is_sound() && !level.is_regression() && is_excused);
-        }
-        if !holds.is_empty() {
-            let findings = counted(holds.len() as u64, "pinned finding");
+        let states = files.iter().filter_map(|(name, _)| Some((name, pins.of(name, today)?)));
+        let mut words: Vec<String> =
+            states.filter(|(_, pin)| pin.expired).map(|(name, pin)| expired(name, &pin)).collect();
+        let pinned = PinnedFindings::of(&pins, &files, today);
+        let excused = pinned.excused(folder)?;
+        if !pinned.is_empty() {
+            let findings = counted(pinned.len() as u64, "pinned finding");
             words.push(format!("{findings}; levels with nothing else wrong, which do not count: {excused}"));
         }
         // A shard has only some of the findings.
-        if lines.record().shard.is_none() {
+        if ResultLines::open(folder)?.record().shard.is_none() {
             let names: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
             words.extend(pins.unknown(&names).iter().map(|name| unknown(name)));
         }

@@ -291,6 +291,7 @@ fn report_comparison(comparison: &Comparison, overview: &Overview) {
         report!("{levels} in both results are compared; {only_now} only now, {only_before} only before");
     }
     comparison.left_out.iter().for_each(|why| report!("left out of the comparison: {why}"));
+    comparison.not_comparable().iter().for_each(|levels| report!("{levels}"));
     comparison.places_left_out.iter().for_each(|why| report!("places not compared: {why}"));
     if let Some(command) = comparable_command(program::name(), &overview.record, comparison) {
         report!("places are compared after the same test as before: {command}");
@@ -307,7 +308,7 @@ fn report_comparison(comparison: &Comparison, overview: &Overview) {
         changes.iter().for_each(|change| report!("{what}: {change}"));
     }
     if lists.iter().all(|(_, changes)| changes.is_empty()) {
-        report!("nothing has changed by more than chance in {}", counted(comparison.levels, "level"));
+        report!("{} in {}", comparison.no_change(), counted(comparison.levels, "level"));
     }
 }
 

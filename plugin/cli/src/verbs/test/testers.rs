@@ -6,7 +6,7 @@ use crate::{
         player::{LoadedPlayer, MeasuredLevels, action_draw, check_run_of},
     },
     error::CliError,
-    verbs::bugs::testers::Named,
+    verbs::{bugs::testers::Named, skills::names::SkillNames},
 };
 use playbot_harness::{game::Game, sealed_file::file_checksum, split::LevelSplit};
 use playbot_learner::DeviceKind;
@@ -42,7 +42,8 @@ impl TesterArgs {
     ///
     /// # Errors
     ///
-    /// One of them does not exist, or was made for another game, or two have one name.
+    /// One of them does not exist, or was made for another game, or two have one name, or the file with the names of a
+    /// policy's skills is damaged.
     pub fn load(&self, game: &dyn Game, split: &LevelSplit, device: DeviceKind) -> Result<Vec<Tester>, CliError> {
         let levels = std::slice::from_ref(split);
         let mut measured = MeasuredLevels::new(game, levels, true);
@@ -58,7 +59,8 @@ impl TesterArgs {
             chosen.check_fit(game)?;
             let known = measured.check(path, chosen.seen.as_ref())?;
             let name = named.as_ref().map(|named| named.name.clone());
-            let record = TesterRecord { known, ..TesterRecord::policy(name, path, file_checksum(path)?) };
+            let skill_names = SkillNames::beside_policy(path)?.regions;
+            let record = TesterRecord { known, skill_names, ..TesterRecord::policy(name, path, file_checksum(path)?) };
             testers.push(self.of_policy(chosen, record));
         }
         for path in &self.run {
@@ -73,8 +75,9 @@ impl TesterArgs {
             let known = measured.check(path, chosen.seen.as_ref())?;
             let name = path.file_name().map_or(chosen.name.clone(), |name| name.to_string_lossy().into_owned());
             let tested = Some(TestedRun { folder: path.display().to_string(), step });
-            testers
-                .push(self.of_policy(chosen, TesterRecord { checksum, run: tested, known, ..TesterRecord::bot(name) }));
+            let skill_names = SkillNames::of_run(path)?.regions;
+            let record = TesterRecord { checksum, run: tested, known, skill_names, ..TesterRecord::bot(name) };
+            testers.push(self.of_policy(chosen, record));
         }
         if testers.is_empty() {
             testers.push(of_bot(LoadedPlayer::default_of(game)?));

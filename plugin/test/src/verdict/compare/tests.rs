@@ -192,6 +192,56 @@ fn places_of_other_testers_are_not_compared_and_the_command_names_the_earlier_on
 }
 
 #[test]
+fn levels_that_only_testers_of_one_test_solved_are_named_and_are_no_change() {
+    let level = |index, solved: [(&str, u64); 2]| LevelVerdict {
+        testers: solved.map(|(name, solved)| tester(name, solved, 1, true)).to_vec(),
+        ..verdict(index, solved[0].1 + solved[1].1, 2)
+    };
+    let parent = tempfile::tempdir().expect("a folder");
+    let (one, other) = (parent.path().join("before"), parent.path().join("now"));
+    let was = |index, search, chaos| level(index, [("search", search), ("chaos", chaos)]);
+    let is = |index, jump, chaos| level(index, [("jump", jump), ("chaos", chaos)]);
+    written(
+        &one,
+        &record(&["search", "chaos"]),
+        &[was(0, 1, 0), was(1, 1, 0), was(2, 1, 1), was(3, 0, 0), was(4, 0, 0)],
+    );
+    written(&other, &record(&["jump", "chaos"]), &[is(0, 0, 0), is(1, 1, 0), is(2, 0, 0), is(3, 1, 0), is(4, 0, 0)]);
+    let found = Comparison::read(&one, &other).expect("comparable");
+    assert_eq!(found.left_out, ["the tester `jump` was not there before", "the tester `search` is not there now"]);
+    let words: Vec<String> = found.other_testers.iter().map(ToString::to_string).collect();
+    let expected = [
+        "hard:0: solved before by search alone, and the testers differ",
+        "hard:3: solved now by jump alone, and the testers differ",
+    ];
+    assert_eq!(words, expected);
+    assert_eq!(names(&found.harder), ["hard:2"], "chaos solved it before, and does not now");
+    let said = found.not_comparable().expect("there are such levels");
+    let expected = "2 levels cannot be compared, since the testers differ and only those of one test solved them: hard:0, \
+                    hard:3";
+    assert_eq!(said, expected);
+    assert_eq!(found.no_change_sentence(), "The testers of both tests show no change by more than chance.");
+    let same = Comparison::read(&one, &one).expect("comparable");
+    assert_eq!((same.not_comparable(), same.no_change()), (None, "nothing has changed by more than chance"));
+}
+
+#[test]
+fn a_level_that_a_new_tester_solves_is_not_counted_as_unsolved() {
+    let both = |jumped: u64| LevelVerdict {
+        testers: vec![tester("chaos", 0, 1, false), tester("jump", jumped, 1, false)],
+        ..unsolved(&["chaos", "jump"], 2)
+    };
+    let one = ["chaos"];
+    let before = record(&one);
+    let now = record(&["chaos", "jump"]);
+    let solved = LevelVerdict { outcome: LevelOutcome::Solved, ..both(1) };
+    let (why, _) = left_out((&before, unsolved(&one, 6)), (&now, solved));
+    assert!(why.is_empty(), "{why:?}");
+    let (why, _) = left_out((&before, unsolved(&one, 6)), (&now, both(0)));
+    assert!(why[0].ends_with(": 1 unsolved level, such as hard:0"), "{why:?}");
+}
+
+#[test]
 fn places_of_other_draws_and_of_results_without_positions_are_named() {
     let testers = ["chaos"];
     let (before, now) = (record(&testers), TestRecord { seed: 9, episodes: 2, ..record(&testers) });

@@ -1,8 +1,17 @@
 //! Issues of levels, in the forms that build servers and editors read.
 
-use crate::verdict::{Finding, LevelOutcome, LevelVerdict, ResultLines, error::TestError, reports::failure};
+use crate::{
+    findings::{Date, PinState},
+    verdict::{
+        Finding, LevelOutcome, LevelVerdict, ResultLines,
+        error::TestError,
+        pinned::{PinnedFindings, pinned_words},
+        reports::failure,
+    },
+};
 use bevy_playbot::state_hash::StateHash;
 use playbot_harness::level_files::is_level_files;
+use playbot_report::escape::uri_path;
 use serde_json::{Value, json};
 use std::{collections::BTreeSet, path::Path};
 
@@ -46,23 +55,48 @@ struct Issue {
     message: String,
     /// Whether it is certain that something is wrong.
     is_error: bool,
+    /// The pin that holds, with which it does not count.
+    pin: Option<PinState>,
     /// The same for the same issue in other results.
     fingerprint: String,
 }
 
-/// Returns the issues of the results in a folder, in a form.
+impl Issue {
+    /// Returns the words of an error, of a warning, or of an issue that does not count.
+    fn severity(&self, [error, warning, pinned]: [&'static str; 3]) -> &'static str {
+        match (&self.pin, self.is_error) {
+            (Some(_), _) => pinned,
+            (None, true) => error,
+            (None, false) => warning,
+        }
+    }
+
+    /// Returns the message, with the reason of the pin in front.
+    fn words(&self) -> String {
+        let pin = self.pin.as_ref().map_or_else(String::new, |pin| format!("{}; ", pinned_words(pin)));
+        format!("{pin}{}", self.message)
+    }
+}
+
+/// Returns the issues of the results in a folder, in a form. Pinned ones have the lowest severity, since `test` does not
+/// count them.
 ///
 /// # Errors
 ///
-/// The folder has no results, or they are damaged.
+/// The folder has no results, or they or its pins are damaged.
 pub fn issues(folder: &Path, form: IssueForm) -> Result<String, TestError> {
+    issues_on(folder, form, Date::today())
+}
+
+fn issues_on(folder: &Path, form: IssueForm, today: Date) -> Result<String, TestError> {
+    let pinned = PinnedFindings::read(folder, today)?;
     let mut lines = ResultLines::open(folder)?;
     let game = lines.record().game.clone();
     let is_files = is_level_files(&lines.record().range.mode);
     let mut all: Vec<Issue> = Vec::new();
     let mut known = BTreeSet::new();
     while let Some(level) = lines.next_level()? {
-        for mut issue in of_level(&game, is_files, &level) {
+        for mut issue in of_level(&game, is_files, &level, &pinned) {
             // Readers take issues with equal fingerprints for one.
             while !known.insert(issue.fingerprint.clone()) {
                 issue.fingerprint = fingerprint(&[&issue.fingerprint, "again"]);
@@ -78,28 +112,30 @@ pub fn issues(folder: &Path, form: IssueForm) -> Result<String, TestError> {
     })
 }
 
-fn of_level(game: &str, is_files: bool, level: &LevelVerdict) -> Vec<Issue> {
+fn of_level(game: &str, is_files: bool, level: &LevelVerdict, pinned: &PinnedFindings) -> Vec<Issue> {
     // Readers look for files from the root of a repository, and know no folder that is called `.`.
     let file = || level.level.strip_prefix("./").unwrap_or(&level.level).to_owned();
     let place = if is_files { file() } else { format!("{game}/{}", level.level) };
-    let issue = |rule: &str, message: String, is_error: bool| Issue {
+    let issue = |rule: &str, message: String, is_error: bool, pin: Option<&PinState>| Issue {
         rule: rule.to_owned(),
         place: place.clone(),
         is_file: is_files,
         fingerprint: fingerprint(&[rule, &place, &message]),
         message,
         is_error,
+        pin: pin.cloned(),
     };
     let found = |finding: &Finding| {
         let who = finding.tester.as_ref().map_or_else(String::new, |tester| format!(" ({tester})"));
-        issue(&finding.detector, format!("{}{who}", finding.message), true)
+        issue(&finding.detector, format!("{}{who}", finding.message), true, pinned.of_finding(finding))
     };
     let mut issues: Vec<Issue> = level.findings.iter().map(found).collect();
     if level.outcome == LevelOutcome::BotFailed && issues.is_empty() {
-        issues.push(issue("unsolved", format!("no tester solved it, which proves nothing: {}", failure(level)), false));
+        let message = format!("no tester solved it, which proves nothing: {}", failure(level));
+        issues.push(issue("unsolved", message, false, pinned.of_unsolved(level)));
     }
     if level.is_regression() {
-        issues.push(issue("recording", level.recorded_news().unwrap_or_default(), true));
+        issues.push(issue("recording", level.recorded_news().unwrap_or_default(), true, None));
     }
     issues
 }
@@ -111,13 +147,9 @@ fn fingerprint(words: &[&str]) -> String {
     format!("{:016x}", StateHash::of(bytes).0)
 }
 
-/// Returns a path as a URI reference: what is no letter, digit or mark is escaped.
+/// Returns a path, of Windows as well, as a URI reference.
 fn uri(path: &str) -> String {
-    let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~/".contains(&byte);
-    path.replace('\\', "/")
-        .bytes()
-        .map(|byte| if plain(byte) { char::from(byte).to_string() } else { format!("%{byte:02X}") })
-        .collect()
+    uri_path(&path.replace('\\', "/"))
 }
 
 fn sarif(issues: &[Issue]) -> Value {
@@ -134,14 +166,20 @@ fn sarif(issues: &[Issue]) -> Value {
             if !issue.is_file {
                 location["logicalLocations"] = json!([{ "fullyQualifiedName": issue.place, "kind": "resource" }]);
             }
-            json!({
+            let mut result = json!({
                 "ruleId": issue.rule,
                 "ruleIndex": rules.binary_search(&issue.rule.as_str()).unwrap_or(0),
-                "level": if issue.is_error { "error" } else { "warning" },
+                "level": issue.severity(["error", "warning", "note"]),
                 "message": { "text": issue.message },
                 "locations": [location],
                 "partialFingerprints": { "playbot/v1": issue.fingerprint },
-            })
+            });
+            if let Some(pin) = &issue.pin {
+                let justification = format!("{} (until {})", pin.reason, pin.until);
+                result["suppressions"] =
+                    json!([{ "kind": "external", "status": "accepted", "justification": justification }]);
+            }
+            result
         })
         .collect();
     let rules: Vec<Value> = rules
@@ -162,10 +200,10 @@ fn sarif(issues: &[Issue]) -> Value {
 fn code_quality(issues: &[Issue]) -> Value {
     let issue = |issue: &Issue| {
         json!({
-            "description": issue.message,
+            "description": issue.words(),
             "check_name": issue.rule,
             "fingerprint": issue.fingerprint,
-            "severity": if issue.is_error { "major" } else { "minor" },
+            "severity": issue.severity(["major", "minor", "info"]),
             "location": { "path": issue.place, "lines": { "begin": 1 } },
         })
     };
@@ -177,10 +215,10 @@ fn warnings(issues: &[Issue]) -> Value {
         json!({
             "fileName": issue.place,
             "lineStart": 1,
-            "severity": if issue.is_error { "ERROR" } else { "NORMAL" },
+            "severity": issue.severity(["ERROR", "NORMAL", "LOW"]),
             "category": issue.rule,
             "type": issue.rule,
-            "message": issue.message,
+            "message": issue.words(),
             "fingerprint": issue.fingerprint,
         })
     };
@@ -192,17 +230,20 @@ fn warnings(issues: &[Issue]) -> Value {
 fn github(issue: &Issue) -> String {
     let message = |text: &str| text.replace('%', "%25").replace('\r', "%0D").replace('\n', "%0A");
     let property = |text: &str| message(text).replace(':', "%3A").replace(',', "%2C");
-    let kind = if issue.is_error { "error" } else { "warning" };
+    let kind = issue.severity(["error", "warning", "notice"]);
     let file = if issue.is_file { format!("file={},line=1,", property(&issue.place)) } else { String::new() };
     let place = if issue.is_file { String::new() } else { format!("{}: ", issue.place) };
-    format!("::{kind} {file}title={}::{}\n", property(&issue.rule), message(&format!("{place}{}", issue.message)))
+    format!("::{kind} {file}title={}::{}\n", property(&issue.rule), message(&format!("{place}{}", issue.words())))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{
-        verdict::{LevelOutcome, TestRecord},
+        verdict::{
+            LevelOutcome, TestRecord,
+            pinned::tests::{in_file, pin},
+        },
         verdict_report::testing::{finding, level, record, tested},
     };
     use serde_json::Map;
@@ -237,6 +278,42 @@ mod tests {
         assert_ne!(quality[0]["fingerprint"], quality[1]["fingerprint"]);
         let warnings: Value = serde_json::from_str(&all("hard:0..2", IssueForm::Warnings)).expect("JSON");
         assert_eq!((&warnings["size"], &warnings["issues"][0]["fileName"]), (&3.into(), &"garden/hard:0".into()));
+    }
+
+    /// Returns the issues of two levels, with one finding each and one that is pinned.
+    fn pinned(form: IssueForm, today: &str) -> String {
+        let parent = tempfile::tempdir().expect("a folder");
+        let with = |index, names: &[&str]| LevelVerdict {
+            findings: names.iter().map(|name| in_file(name)).collect(),
+            ..level(index, 0, 9, 0)
+        };
+        let folder =
+            tested(parent.path(), "whole", &record("hard:0..1", None), &[with(0, &["a"]), with(1, &["b", "c"])]);
+        pin(&folder, &["a", "b"], "2027-01-31");
+        issues_on(&folder, form, today.parse().expect("a day")).expect("results")
+    }
+
+    #[test]
+    fn pinned_findings_are_no_errors_until_their_pins_expire() {
+        let [held, expired] = ["2027-01-31", "2027-02-01"].map(|day| pinned(IssueForm::Github, day));
+        let notice = "::notice title=panic::garden/hard:0: pinned until 2027-01-31: drawn anew in spring; a (random)";
+        assert_eq!(held.lines().next(), Some(notice));
+        let count = |text: &str, kind: &str| text.lines().filter(|line| line.starts_with(kind)).count();
+        assert_eq!((count(&held, "::notice "), count(&held, "::error "), held.lines().count()), (2, 1, 3), "{held}");
+        assert_eq!((count(&expired, "::notice "), count(&expired, "::error ")), (0, 3), "{expired}");
+        let json = |form, day| serde_json::from_str::<Value>(&pinned(form, day)).expect("JSON");
+        let results = |day| json(IssueForm::Sarif, day)["runs"][0]["results"].clone();
+        let [now, later] = ["2027-01-31", "2027-02-01"].map(results);
+        let suppressed = json!([{
+            "kind": "external", "status": "accepted", "justification": "drawn anew in spring (until 2027-01-31)",
+        }]);
+        assert_eq!((&now[0]["level"], &now[0]["suppressions"]), (&"note".into(), &suppressed));
+        assert_eq!((&now[2]["level"], &now[2]["suppressions"]), (&"error".into(), &Value::Null));
+        assert_eq!(now[0]["partialFingerprints"], later[0]["partialFingerprints"], "it is the same issue");
+        assert!(later.as_array().is_some_and(|all| all.iter().all(|result| result["level"] == "error")), "{later}");
+        let severities = |value: &Value| [0, 1, 2].map(|number| value[number]["severity"].clone());
+        assert_eq!(severities(&json(IssueForm::CodeQuality, "2027-01-31")), ["info", "info", "major"]);
+        assert_eq!(severities(&json(IssueForm::Warnings, "2027-01-31")["issues"]), ["LOW", "LOW", "ERROR"]);
     }
 
     #[test]
@@ -393,7 +470,8 @@ mod tests {
     fn each_form_fits_its_schema_whatever_the_texts_are() {
         for (form, schema) in SCHEMAS {
             let schema = Schema::of(schema);
-            let texts = [hostile(true, form), hostile(false, form), all("hard:0..2", form), of_sound(3, form)];
+            let pinned = pinned(form, "2027-01-31");
+            let texts = [hostile(true, form), hostile(false, form), all("hard:0..2", form), of_sound(3, form), pinned];
             for text in texts {
                 let value: Value = serde_json::from_str(&text).expect("JSON");
                 assert_eq!(schema.faults(&value), Vec::<String>::new(), "{form:?}: {text}");

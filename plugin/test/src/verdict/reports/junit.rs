@@ -5,10 +5,11 @@
 //! `SOURCE_DATE_EPOCH`.
 
 use crate::{
-    findings::{DAY, Date},
+    findings::{DAY, Date, PinState},
     verdict::{
         LevelOutcome, LevelVerdict,
         error::{TestError, io_error},
+        pinned::{PinnedFindings, pinned_words},
         plan::{TestRecord, TesterRecord},
         reports::{JUNIT, failure, rerun_commands},
         results::{Overview, ResultLines},
@@ -20,7 +21,7 @@ use quick_xml::{
     Writer,
     events::{BytesDecl, BytesEnd, BytesStart, BytesText, Event},
 };
-use std::{env, ffi::OsStr, io, io::Write, path::Path, time::Duration};
+use std::{collections::BTreeSet, env, ffi::OsStr, io, io::Write, path::Path, time::Duration};
 
 /// The host in every file: results are independent of the machine.
 const HOST: &str = "localhost";
@@ -53,18 +54,27 @@ fn date(seconds: &OsStr) -> Result<String, TestError> {
 }
 
 /// Writes the results in a folder to `junit.xml` there, with this date. A level that was not solved, that has a finding, or
-/// that no longer ends as recorded, has failed.
+/// that no longer ends as recorded, has failed. If all that is wrong with it is pinned, it is skipped: it does not count for
+/// the exit code of `test` either.
 ///
 /// A suite begins with its counts, which are those of `overview`. So a million levels take no more memory than one.
 pub(super) fn write_junit(
     folder: &Path,
     overview: &Overview,
+    pinned: &PinnedFindings,
     program: &str,
     date: Option<&str>,
 ) -> Result<(), TestError> {
     let lines = ResultLines::open(folder)?;
     let path = folder.join(JUNIT);
-    write_atomically_with(&path, |file| write_suites(file, lines, overview, program, date))
+    let skipped = pinned.excused(folder)?;
+    let all = Totals {
+        tests: overview.levels,
+        failures: overview.unsound.saturating_sub(skipped),
+        skipped,
+        time: overview.time,
+    };
+    write_atomically_with(&path, |file| write_suites(file, lines, &all, pinned, program, date))
         .map_err(io_error("write", &path))
 }
 
@@ -72,19 +82,20 @@ pub(super) fn write_junit(
 struct Totals {
     tests: u64,
     failures: u64,
+    skipped: u64,
     time: Option<Duration>,
 }
 
 fn write_suites(
     file: &mut dyn Write,
     mut lines: ResultLines,
-    overview: &Overview,
+    all: &Totals,
+    pinned: &PinnedFindings,
     program: &str,
     date: Option<&str>,
 ) -> io::Result<()> {
     let record = lines.record().clone();
     let class = class(&record);
-    let all = Totals { tests: overview.levels, failures: overview.unsound, time: overview.time };
     let mut xml = Xml { writer: Writer::new_with_indent(file, b' ', 4) };
     xml.writer.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
     let mut suites = Tag::new("testsuites");
@@ -96,14 +107,17 @@ fn write_suites(
     xml.begin(suites)?;
     let is_file_a_suite = is_level_files(&record.range.mode) && all.tests > 0;
     if !is_file_a_suite {
-        xml.begin(suite(&record, None, date, &all))?;
+        xml.begin(suite(&record, None, date, all))?;
     }
     while let Some(level) = lines.next_level().map_err(io::Error::other)? {
+        let pins = pinned.of_level(&level);
         if is_file_a_suite {
-            let one = Totals { tests: 1, failures: u64::from(!level.is_sound()), time: level.time() };
+            let skipped = u64::from(!pins.is_empty());
+            let failures = u64::from(!level.is_sound()) - skipped;
+            let one = Totals { tests: 1, failures, skipped, time: level.time() };
             xml.begin(suite(&record, Some(&level.level), date, &one))?;
         }
-        write_case(&mut xml, &record, &level, program, &class)?;
+        write_case(&mut xml, &record, &level, &pins, program, &class)?;
         if is_file_a_suite {
             xml.end("testsuite")?;
         }
@@ -122,7 +136,7 @@ fn suite(record: &TestRecord, file: Option<&str>, date: Option<&str>, totals: &T
     let mut suite = Tag::new("testsuite");
     suite.text("name", &format!("{} {levels}", record.game));
     suite.text("tests", &totals.tests.to_string());
-    suite.text("skipped", "0");
+    suite.text("skipped", &totals.skipped.to_string());
     suite.text("errors", "0");
     suite.text("failures", &totals.failures.to_string());
     suite.time(totals.time);
@@ -140,6 +154,7 @@ fn write_case(
     xml: &mut Xml<'_>,
     record: &TestRecord,
     level: &LevelVerdict,
+    pins: &[&PinState],
     program: &str,
     class: &str,
 ) -> io::Result<()> {
@@ -151,12 +166,18 @@ fn write_case(
         return xml.writer.write_event(Event::Empty(case.0));
     }
     xml.begin(case)?;
-    let mut failed = Tag::new("failure");
-    failed.text("message", &failure(level));
+    let (name, message) = if pins.is_empty() {
+        ("failure", failure(level))
+    } else {
+        let words: BTreeSet<String> = pins.iter().map(|pin| pinned_words(pin)).collect();
+        ("skipped", words.into_iter().collect::<Vec<_>>().join("; "))
+    };
+    let mut failed = Tag::new(name);
+    failed.text("message", &message);
     failed.text("type", kind(level));
     xml.begin(failed)?;
     xml.writer.write_event(Event::Text(BytesText::new(&of_xml(&description(record, level, program)))))?;
-    xml.end("failure")?;
+    xml.end(name)?;
     xml.end("testcase")
 }
 
@@ -271,20 +292,18 @@ mod tests {
         verdict::{
             EpisodeScore, Finding, TestedRun,
             folder::{Earlier, TestFolder},
+            pinned::tests::{in_file, pin},
             testing,
             testing::{tester, verdict},
         },
     };
     use playbot_harness::{detector::LevelProof, split::LevelSplit};
     use quick_xml::{Reader, XmlVersion};
-    use std::{
-        collections::{BTreeMap, BTreeSet},
-        fs,
-    };
+    use std::{collections::BTreeMap, fs};
 
     /// Elements of junit-10.xsd that are written: parent, name, required attributes, and others that are allowed. The
     /// schema lets the elements below a suite and a case come in any order.
-    const SCHEMA: [(&str, &str, &[&str], &[&str]); 4] = [
+    const SCHEMA: [(&str, &str, &[&str], &[&str]); 5] = [
         ("", "testsuites", &[], &["name", "time", "tests", "failures", "errors"]),
         (
             "testsuites",
@@ -294,6 +313,7 @@ mod tests {
         ),
         ("testsuite", "testcase", &["name"], &["time", "classname", "group"]),
         ("testcase", "failure", &[], &["type", "message"]),
+        ("testcase", "skipped", &[], &["type", "message"]),
     ];
 
     /// Attributes that count elements.
@@ -338,7 +358,8 @@ mod tests {
                 }
                 Event::Text(words) if words.iter().all(u8::is_ascii_whitespace) => {}
                 Event::Text(_) | Event::GeneralRef(_) => {
-                    assert_eq!(open.last().map(String::as_str), Some("failure"), "text is elsewhere in {text}");
+                    let within = open.last().map(String::as_str);
+                    assert!(matches!(within, Some("failure" | "skipped")), "text is elsewhere in {text}");
                 }
                 Event::Decl(_) => assert!(found.is_empty(), "{text}"),
                 Event::Eof => {
@@ -399,7 +420,7 @@ mod tests {
         let counts = ["tests", "failures", "errors"].map(|count| all.count(count));
         assert_eq!(counts, [of(rest, "testcase"), of(rest, "failure"), 0], "{text}");
         for suite in rest.chunk_by(|_, next| next.name != "testsuite") {
-            let counts = [of(suite, "testcase"), of(suite, "failure"), 0, 0];
+            let counts = [of(suite, "testcase"), of(suite, "failure"), 0, of(suite, "skipped")];
             assert_eq!(COUNTS.map(|count| suite[0].count(count)), counts, "{text}");
             for case in suite[1..].chunk_by(|_, next| next.name != "testcase") {
                 assert!(case.len() <= 2, "a case has two failures: {text}");
@@ -413,15 +434,38 @@ mod tests {
 
     /// Returns the file with this date, and checks it.
     fn dated(record: &TestRecord, levels: &[LevelVerdict], date: Option<&str>) -> String {
+        with_pins(record, levels, &[], date)
+    }
+
+    /// Returns the file of results with these pins, and checks it.
+    fn with_pins(record: &TestRecord, levels: &[LevelVerdict], pins: &[&str], date: Option<&str>) -> String {
         let parent = tempfile::tempdir().expect("a folder");
         let (mut folder, _) = TestFolder::open(parent.path(), record, Earlier::Keep).expect("new");
         levels.iter().for_each(|level| folder.keep(level).expect("writable"));
         folder.finish().expect("writable");
+        pin(parent.path(), pins, "2027-01-31");
+        let pinned = PinnedFindings::read(parent.path(), "2027-01-01".parse().expect("a day")).expect("pins");
         let overview = Overview::read(parent.path()).expect("results");
-        write_junit(parent.path(), &overview, "playbot", date).expect("results");
+        write_junit(parent.path(), &overview, &pinned, "playbot", date).expect("results");
         let text = fs::read_to_string(parent.path().join(JUNIT)).expect("written");
         check(&text);
         text
+    }
+
+    #[test]
+    fn a_level_whose_findings_are_all_pinned_is_skipped() {
+        let with = |index, names: &[&str]| LevelVerdict {
+            findings: names.iter().map(|name| in_file(name)).collect(),
+            ..verdict(index, 2, 2)
+        };
+        let levels = [with(0, &["a", "b"]), with(1, &["a", "c"]), verdict(2, 2, 2)];
+        for mode in ["hard", "files:levels/*.json"] {
+            let text = with_pins(&record(mode), &levels, &["a", "b"], None);
+            let reason = "pinned until 2027-01-31: drawn anew in spring".to_owned();
+            assert_eq!(values(&text, "skipped", "message"), [Some(reason)], "equal reasons are there once");
+            assert_eq!(values(&text, "failure", "type"), [Some("panic".to_owned())]);
+            assert_eq!(values(&text, "testsuites", "failures"), [Some("1".to_owned())]);
+        }
     }
 
     /// A finding of `panic` with this message.
