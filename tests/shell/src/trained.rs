@@ -73,7 +73,7 @@ impl GameProgram {
         let steps: Vec<u64> =
             lines.iter().filter(|line| line["stage"] == "training").filter_map(|line| line["done"].as_u64()).collect();
         assert_eq!((steps.first(), steps.last()), (Some(&640), Some(&1024)), "{lines:?}");
-        let imitated = lines.iter().any(|line| line["stage"] == "imitation");
+        let imitated = lines.iter().any(|line| line["event"] == "progress" && line["stage"] == "imitation");
         assert!(!imitated, "{lines:?}");
         // It begins with the policy that is there.
         assert_eq!(lines.iter().find(|line| line["event"] == "policy"), policies.last().copied(), "{lines:?}");
