@@ -182,6 +182,19 @@ impl Drop for GamesPrintElsewhere {
     }
 }
 
+/// [Prepares](prepare) a file that is overwritten only with `--force`.
+///
+/// # Errors
+///
+/// There is one and it was not asked for, or as for [`prepare`].
+pub(crate) fn prepare_new(path: &Path, force: bool) -> Result<(), CliError> {
+    if path.is_file() && !force {
+        let path = path.display();
+        return Err(CliError::Usage(format!("{path} exists: name another file, or overwrite it with --force")));
+    }
+    prepare(path)
+}
+
 /// Makes the folder of a file, and tests whether the file can be written.
 ///
 /// # Errors

@@ -61,12 +61,15 @@ pub struct PlayerArgs {
     device: Device,
 }
 
+/// Name of the file with names of skills in the folder of a run, and the ending of one beside a policy.
+pub(crate) const SKILL_NAMES: &str = "skill-names.json";
+
 impl PlayerArgs {
     /// Returns the file with names of the policy's skills: in the folder of the run, or beside the policy. `None` for a
     /// bot.
     pub fn names_file(&self) -> Option<PathBuf> {
-        let of_run = self.run.as_ref().map(|run| run.join("skill-names.json"));
-        of_run.or_else(|| self.policy.as_ref().map(|policy| policy.with_extension("skill-names.json")))
+        let of_run = self.run.as_ref().map(|run| run.join(SKILL_NAMES));
+        of_run.or_else(|| self.policy.as_ref().map(|policy| policy.with_extension(SKILL_NAMES)))
     }
 }
 

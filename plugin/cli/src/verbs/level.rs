@@ -3,7 +3,7 @@
 use crate::{
     arguments::{LevelsArg, default_mode, experiment::quoted},
     error::{CliError, Outcome},
-    output::{prepare, print_or_replace, program},
+    output::{prepare_new, print_or_replace, program},
     pictures::{plot, plot::PlotFile},
 };
 use playbot_harness::{
@@ -13,7 +13,7 @@ use playbot_harness::{
     level_files::is_level_files,
 };
 use playbot_learner::ActionSpace;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Show a level: its layout, or what is known of it without playing it.
 ///
@@ -71,7 +71,7 @@ pub struct Args {
 
 pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
-    args.out.as_deref().map(|out| check_out(out, args.force)).transpose()?;
+    args.out.as_deref().map(|out| prepare_new(out, args.force)).transpose()?;
     let file = args.png.as_deref().map(PlotFile::new).transpose()?;
     let level = show(game, &args, file.is_some())?;
     if let (Some(file), Some(picture)) = (file, &level.picture) {
@@ -83,15 +83,6 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         instead(game, &args).iter().for_each(|advice| report!("{advice}"));
     }
     Ok(Outcome::Pass)
-}
-
-/// Checks that the level can be written to a file, before another one is.
-fn check_out(out: &Path, force: bool) -> Result<(), CliError> {
-    if out.is_file() && !force {
-        let out = out.display();
-        return Err(CliError::Usage(format!("{out} exists: name another file, or overwrite it with --force")));
-    }
-    prepare(out)
 }
 
 /// Returns the commands that show a level without a plan. A level from standard input cannot be named in them.

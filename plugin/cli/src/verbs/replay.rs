@@ -155,14 +155,7 @@ fn instead_of(folder: &Path) -> CliError {
 }
 
 fn check_out(args: &Args) -> Result<(), CliError> {
-    let Some(out) = &args.out else { return Ok(()) };
-    if out.is_file() && !args.force {
-        return Err(CliError::Usage(format!(
-            "{} exists: name another file, or overwrite it with --force",
-            out.display()
-        )));
-    }
-    output::prepare(out)
+    args.out.as_deref().map_or(Ok(()), |out| output::prepare_new(out, args.force))
 }
 
 /// Plays a finding again, with a progress bar.

@@ -9,7 +9,10 @@ mod page;
 mod rollouts;
 
 use crate::{
-    arguments::{LevelsArg, check_start, default_mode, player::PlayerArgs},
+    arguments::{
+        LevelsArg, check_start, default_mode,
+        player::{PlayerArgs, SKILL_NAMES},
+    },
     error::{CliError, Outcome},
     output,
     output::print_line,
@@ -107,8 +110,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         return Err(CliError::Usage(format!("--dims {dim}: z has {latent} values, counted from 0")));
     }
     let (ticks, interval) = (args.ticks.unwrap_or(prior.skill_interval.max(20)), prior.skill_interval);
-    let names_file =
-        args.names.clone().or_else(|| args.player.names_file()).unwrap_or_else(|| "skill-names.json".into());
+    let names_file = args.names.clone().or_else(|| args.player.names_file()).unwrap_or_else(|| SKILL_NAMES.into());
     let names = SkillNames::read(&names_file)?;
     let observation_config = observation_config(game, &chosen.observation_config)?;
     interrupt::listen();

@@ -2,7 +2,7 @@
 
 use crate::{
     error::CliError,
-    output::{beside, prepare},
+    output::{beside, prepare_new},
 };
 use bevy_playbot::demo::file::DemoWriter;
 use playbot_harness::{demo::verify_file, floor_plan::FloorPlan, game::Game, trails::cells::CellChart};
@@ -21,13 +21,7 @@ impl RecordingFile {
     ///
     /// It exists without `--force`, or nothing can be written there.
     pub fn new(path: &Path, force: bool) -> Result<Self, CliError> {
-        if path.is_file() && !force {
-            return Err(CliError::Usage(format!(
-                "{} exists: name another file, or overwrite it with --force",
-                path.display()
-            )));
-        }
-        prepare(path)?;
+        prepare_new(path, force)?;
         Ok(Self(path.to_owned()))
     }
 

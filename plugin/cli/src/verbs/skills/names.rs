@@ -1,12 +1,13 @@
 //! Names of regions of skills, in a file beside the policy.
 
-use crate::{arguments::player::PlayerArgs, error::CliError, output};
+use crate::{
+    arguments::player::{PlayerArgs, SKILL_NAMES},
+    error::CliError,
+    output,
+};
 use bevy_playbot::skill_prior::NamedSkill;
 use playbot_harness::sealed_file::io_error;
 use std::{fs, io, path::Path};
-
-/// Name of the file in the folder of a run, and the ending of one beside a policy: see [`PlayerArgs::names_file`].
-const ENDING: &str = "skill-names.json";
 
 /// The named regions of a policy's skills.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -41,7 +42,7 @@ impl SkillNames {
     ///
     /// As for [`read`](Self::read).
     pub fn beside_policy(policy: &Path) -> Result<Self, CliError> {
-        Self::read(&policy.with_extension(ENDING))
+        Self::read(&policy.with_extension(SKILL_NAMES))
     }
 
     /// Reads the names of the skills of a run, from the file in its folder.
@@ -50,7 +51,7 @@ impl SkillNames {
     ///
     /// As for [`read`](Self::read).
     pub fn of_run(folder: &Path) -> Result<Self, CliError> {
-        Self::read(&folder.join(ENDING))
+        Self::read(&folder.join(SKILL_NAMES))
     }
 
     /// Reads the names of a player's skills; none for a bot.

@@ -74,7 +74,7 @@ impl Rollouts<'_> {
         world.name_skills(names.regions.clone());
         world.follow(z);
         let (mut steps, mut reach, mut path) = (Vec::new(), Reach::default(), Vec::new());
-        // Before the first tick nobody is anywhere.
+        // Before the first tick there is no level, and the agent has no position in it.
         let start = if self.tick > 0 { world.position(self.game) } else { None };
         path.extend(start.map(|position| position.to_array()));
         while (steps.len() as u32) < self.ticks {
