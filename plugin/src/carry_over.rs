@@ -233,6 +233,7 @@ mod tests {
             [
                 "Action",
                 "ActiveSkill",
+                "AgentMemory",
                 "AgentStreams",
                 "BlankEpisodes",
                 "BlindBot",

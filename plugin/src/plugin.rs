@@ -101,6 +101,7 @@ fn add_decision_systems(app: &mut App, schedule: impl ScheduleLabel) {
                 reward::clear_rewards,
                 episode::begin_episodes,
                 skill_prior::end_skills,
+                policy::forget,
                 episode::note_level_tick,
             )
                 .chain()

@@ -83,9 +83,25 @@ pub struct Decision {
     pub value: f32,
 }
 
+/// What the agent's policy remembers of the present episode. It is empty at first, and for a policy without memory.
+#[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component, CarryComponent)]
+pub struct AgentMemory(pub Vec<f32>);
+
 /// Adds the components of a policy to every agent.
 pub(crate) fn plugin(app: &mut App) {
-    app.init_resource::<PolicyBatch>().register_required_components::<Agent, Decision>();
+    app.init_resource::<PolicyBatch>()
+        .register_required_components::<Agent, Decision>()
+        .register_required_components::<Agent, AgentMemory>();
+}
+
+/// Ends memories with their episode, under any control.
+pub(crate) fn forget(mut agents: Query<(&Episode, &mut AgentMemory)>) {
+    for (episode, mut memory) in &mut agents {
+        if episode.is_running() && episode.tick == 0 && !memory.0.is_empty() {
+            memory.0.clear();
+        }
+    }
 }
 
 /// Decides for all agents under [`Control::Policy`] in one batched forward pass, among their [`LegalActions`].
@@ -98,7 +114,7 @@ pub(crate) fn run_policy(
         &Control,
         &Episode,
         (&Observation, Option<&ImageSensor>, Option<&LegalActions>),
-        &ActiveSkill,
+        (&ActiveSkill, Option<&mut AgentMemory>),
         &mut AgentStreams,
         &mut Action,
         &mut Decision,
@@ -109,7 +125,8 @@ pub(crate) fn run_policy(
     let skill_interval = prior.map(|prior| prior.skill_interval);
     batch.start(&active.policy.observation());
     for &entity in order.entities() {
-        let Ok((agent, control, episode, (observation, sensor, legal), skill, ..)) = agents.get(entity) else {
+        let Ok((agent, control, episode, (observation, sensor, legal), (skill, memory), ..)) = agents.get(entity)
+        else {
             continue;
         };
         if *control != Control::Policy || !episode.is_running() {
@@ -119,7 +136,16 @@ pub(crate) fn run_policy(
             faults.report(why);
             return;
         }
+        let width = active.policy.memory();
+        let Some(memory) = memory.map_or((width == 0).then_some(&[][..]), |memory| Some(&memory.0)) else {
+            return faults.report(format!(
+                "agent {}: the policy remembers {width} numbers, but the agent has no `AgentMemory`: insert \
+                 `AgentMemory::default()`, which every `Agent` is spawned with",
+                agent.index
+            ));
+        };
         batch.push(entity, observation, legal, skill, skill_interval);
+        batch.push_memory(memory, width);
     }
     if batch.agents().is_empty() {
         return;
@@ -129,7 +155,7 @@ pub(crate) fn run_policy(
         Err(error) => return faults.report(format!("the policy cannot decide: {error}")),
     };
     for (row, &entity) in batch.agents().iter().enumerate() {
-        let Ok((.., mut streams, mut action, mut decision)) = agents.get_mut(entity) else { continue };
+        let Ok((.., (_, memory), mut streams, mut action, mut decision)) = agents.get_mut(entity) else { continue };
         let (chosen, log_prob) = match active.draw {
             ActionDraw::Sample => output.sample(row, &mut streams.action),
             ActionDraw::Greedy => {
@@ -138,6 +164,10 @@ pub(crate) fn run_policy(
                 (greedy, log_prob)
             }
         };
+        if let (Some(mut memory), width @ 1..) = (memory, active.policy.memory()) {
+            memory.0.clear();
+            memory.0.extend_from_slice(&output.memory[row * width..(row + 1) * width]);
+        }
         action.0 = chosen;
         *decision = Decision { log_prob, value: output.values[row] };
     }

@@ -35,6 +35,11 @@ impl PolicyBatch {
         &self.rows.left
     }
 
+    /// Returns what the policy remembered before, one agent after the other; empty for a policy without memory.
+    pub fn memory(&self) -> &[f32] {
+        &self.rows.memory
+    }
+
     /// Returns the masks of their actions, one after the other; empty if no agent has one.
     pub fn legal(&self) -> &[bool] {
         &self.rows.legal
@@ -46,10 +51,11 @@ impl PolicyBatch {
     }
 
     pub(crate) fn start(&mut self, kind: &ObsKind) {
-        let PolicyRows { observations, skills, left, legal, count } = &mut self.rows;
+        let PolicyRows { observations, skills, left, memory, legal, count } = &mut self.rows;
         start_batch(observations, kind);
         skills.clear();
         left.clear();
+        memory.clear();
         legal.clear();
         *count = 0;
         self.agents.clear();
@@ -72,6 +78,15 @@ impl PolicyBatch {
         self.rows.count += 1;
     }
 
+    /// Adds what the newest agent remembers to a policy with a memory of this width. A memory of another policy does not
+    /// count: the agent begins anew.
+    pub(crate) fn push_memory(&mut self, memory: &[f32], width: usize) {
+        let all = &mut self.rows.memory;
+        let end = all.len() + width;
+        all.extend_from_slice(if memory.len() == width { memory } else { &[] });
+        all.resize(end, 0.0);
+    }
+
     /// Decides in one pass, together with other Worlds if there are any.
     pub(crate) fn decide(&mut self, policy: &Policy, shared: Option<&SharedBatch>) -> Result<PolicyOutput, String> {
         match shared {
@@ -90,6 +105,8 @@ pub struct PolicyRows {
     pub skills: Vec<f32>,
     /// The remaining share of each skill's ticks, this one included; empty without skills.
     pub left: Vec<f32>,
+    /// `count` memories, one after the other; empty for a policy without memory.
+    pub memory: Vec<f32>,
     /// True for each legal action of each state, one after the other; empty if all are legal.
     pub legal: Vec<bool>,
     /// Number of states.
@@ -99,7 +116,8 @@ pub struct PolicyRows {
 impl Default for PolicyRows {
     fn default() -> Self {
         let observations = Observations::Vector(Vec::new());
-        Self { observations, skills: Vec::new(), left: Vec::new(), legal: Vec::new(), count: 0 }
+        let (skills, left, memory) = (Vec::new(), Vec::new(), Vec::new());
+        Self { observations, skills, left, memory, legal: Vec::new(), count: 0 }
     }
 }
 
@@ -108,9 +126,10 @@ impl PolicyRows {
     ///
     /// # Errors
     ///
-    /// As [`Policy::forward_held`].
+    /// As [`Policy::forward_remembering`].
     pub fn decide(&self, policy: &Policy) -> Result<PolicyOutput, LearnError> {
-        let mut output = policy.forward_held(&self.skills, &self.left, &self.observations, self.count)?;
+        let mut output =
+            policy.forward_remembering(&self.skills, &self.left, &self.memory, &self.observations, self.count)?;
         output.restrict(&self.legal);
         Ok(output)
     }
@@ -132,6 +151,7 @@ impl PolicyRows {
         self.observations.push(&more.observations)?;
         self.skills.extend_from_slice(&more.skills);
         self.left.extend_from_slice(&more.left);
+        self.memory.extend_from_slice(&more.memory);
         self.push_legal(&more.legal, more.count);
         self.count += more.count;
         Ok(())

@@ -134,6 +134,7 @@ mod tests {
             head: [0.9f32, 0.09, 0.01].map(f32::ln).to_vec(),
             log_std: Vec::new(),
             values: vec![4.0],
+            memory: Vec::new(),
         };
         output.restrict(&[false, false, true]);
         let mut rng = crate::Streams::new(1).stream("draw", 0);

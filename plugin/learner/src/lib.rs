@@ -69,7 +69,7 @@ pub use crate::{
     learner::{ContinuedSchedule, LearnTimes, Learner, LearnerBase, LearnerMetrics},
     norm::RewardReset,
     observation::{Augmentation, ImageShape, ObsKind, ObsSlice, Observations, PictureMetadata},
-    policy::{Policy, PolicyOutput, StdKind},
+    policy::{MemoryKind, Policy, PolicyOutput, StdKind},
     policy_file::{PolicyFile, PolicyMetadata},
     ppo::{PpoConfig, PpoLearner, UpdateMetrics},
     rng::{RngState, Streams},

@@ -3,18 +3,20 @@
 //! The folder, in reading order:
 //!
 //! - `inputs`: inputs of networks: skills joined with observations.
+//! - `memory`: what policies remember from tick to tick.
 //! - `actor`: the network of a distribution over actions, and the one that estimates the return.
 
 mod actor;
 mod inputs;
+mod memory;
 
 use crate::{
     ActionSpace, ActionValue, LearnError, ObsKind, ObsSlice, PolicySpec,
     device::guarded,
     legal::restrict,
     nn::{
-        CnnKind, HostDist, ImageNet, argmax, categorical_log_prob, frozen, gaussian_log_prob, host, sample_categorical,
-        sample_gaussian, squashed_log_prob, unsquashed_action, vector,
+        CnnKind, HostDist, ImageNet, argmax, categorical_log_prob, frozen, gaussian_log_prob, host, matrix,
+        sample_categorical, sample_gaussian, squashed_log_prob, unsquashed_action, vector,
     },
     norm::ObsStats,
 };
@@ -26,10 +28,12 @@ use std::sync::Arc;
 pub use crate::policy::{
     actor::{Actor, Critic, LogStd, NetShape, StdKind},
     inputs::NetInput,
+    memory::{Memory, MemoryKind, Recall},
 };
 pub(crate) use crate::policy::{
     actor::{ActorShape, InputWidths, StdShape},
     inputs::{InputBuilder, StateBatch, joined_rows},
+    memory::{BurnIn, Grid, send_rows},
 };
 
 /// Number of rows that the networks read at a time. The result of a row does not depend on the others.
@@ -105,6 +109,11 @@ impl Policy {
         self.actor.cnn.as_ref().map(ImageNet::kind)
     }
 
+    /// Returns the numbers that it remembers from tick to tick; 0 without memory.
+    pub fn memory(&self) -> usize {
+        self.actor.memory.as_ref().map_or(0, Memory::width)
+    }
+
     /// Distributions and values for `n` observations.
     ///
     /// `z` is `n * latent` (ignored if [`Self::latent`] is 0), `obs` is `n * obs_dim`.
@@ -128,9 +137,28 @@ impl Policy {
         obs: impl Into<ObsSlice<'a>>,
         n: usize,
     ) -> Result<PolicyOutput, LearnError> {
-        let (mut head, mut log_std, mut values) = (Vec::new(), Vec::new(), Vec::new());
-        let dim = self.spec.action_space.dim();
-        self.for_each_chunk(StateBatch { z, left, obs: obs.into(), n }, |x, left, rows| {
+        self.forward_remembering(z, left, &[], obs, n)
+    }
+
+    /// Does [`Self::forward_held`] for agents with the memories `memory`, `n * memory()`. Without any all begin anew,
+    /// with zeros. [`PolicyOutput::memory`] is what they remember afterwards.
+    ///
+    /// # Errors
+    /// As [`Self::forward`].
+    pub fn forward_remembering<'a>(
+        &self,
+        z: &[f32],
+        left: &[f32],
+        memory: &[f32],
+        obs: impl Into<ObsSlice<'a>>,
+        n: usize,
+    ) -> Result<PolicyOutput, LearnError> {
+        let (mut head, mut log_std, mut values, mut after) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let (dim, width) = (self.spec.action_space.dim(), self.memory());
+        self.for_each_chunk(StateBatch { z, left, memory, obs: obs.into(), n }, |(x, remembered), left, rows| {
+            if let Some(remembered) = remembered {
+                after.extend_from_slice(&host(remembered)?[..rows * width]);
+            }
             let dist = self.actor.forward(x.clone()).to_host()?;
             head.extend_from_slice(&dist.head[..rows * dim]);
             if let Some(stds) = dist.log_std {
@@ -138,13 +166,16 @@ impl Policy {
             }
             self.append_values(x, left, rows, &mut values)
         })?;
-        for (name, numbers) in [("actor output", &head), ("actor log_std", &log_std), ("critic output", &values)] {
+        for (name, numbers) in
+            [("actor output", &head), ("actor log_std", &log_std), ("critic output", &values), ("actor memory", &after)]
+        {
             // A log-probability may be -infinity without harm.
             if numbers.iter().any(|x| x.is_nan() || *x == f32::INFINITY) {
                 return Err(LearnError::NotFinite { tensor: name.to_owned(), steps: None });
             }
         }
-        Ok(PolicyOutput { space: self.spec.action_space, squashed: self.actor.is_squashed(), head, log_std, values })
+        let (space, squashed) = (self.spec.action_space, self.actor.is_squashed());
+        Ok(PolicyOutput { space, squashed, head, log_std, values, memory: after })
     }
 
     /// Returns only the values of [`Self::forward`]; zeros if there is no critic.
@@ -166,12 +197,27 @@ impl Policy {
         obs: impl Into<ObsSlice<'a>>,
         n: usize,
     ) -> Result<Vec<f32>, LearnError> {
+        self.values_remembering(z, left, &[], obs, n)
+    }
+
+    /// Returns only the values of [`Self::forward_remembering`]; zeros if there is no critic.
+    ///
+    /// # Errors
+    /// As [`Self::forward`].
+    pub fn values_remembering<'a>(
+        &self,
+        z: &[f32],
+        left: &[f32],
+        memory: &[f32],
+        obs: impl Into<ObsSlice<'a>>,
+        n: usize,
+    ) -> Result<Vec<f32>, LearnError> {
         if self.critic.is_none() {
             return Ok(vec![0.0; n]);
         }
         let mut values = Vec::with_capacity(n);
-        let states = StateBatch { z, left, obs: obs.into(), n };
-        self.for_each_chunk(states, |x, left, rows| self.append_values(x, left, rows, &mut values))?;
+        let states = StateBatch { z, left, memory, obs: obs.into(), n };
+        self.for_each_chunk(states, |(x, _), left, rows| self.append_values(x, left, rows, &mut values))?;
         Ok(values)
     }
 
@@ -190,17 +236,17 @@ impl Policy {
         Ok(())
     }
 
-    /// Calls `read` with the joined inputs of some states at a time, the remaining shares of their skills, and their
-    /// number, until all were read.
+    /// Calls `read` with the joined inputs of some states at a time and what is remembered after them, the remaining
+    /// shares of their skills, and their number, until all were read.
     ///
     /// The inputs have at least two rows. Matrix libraries sum a single row in another order than the rows of a
     /// matrix, and a lone agent must act like one of many.
     fn for_each_chunk(
         &self,
         states: StateBatch<'_>,
-        mut read: impl FnMut(Tensor<2>, Option<Tensor<1>>, usize) -> Result<(), LearnError>,
+        mut read: impl FnMut((Tensor<2>, Option<Tensor<2>>), Option<Tensor<1>>, usize) -> Result<(), LearnError>,
     ) -> Result<(), LearnError> {
-        let StateBatch { z, left, obs, n } = states;
+        let StateBatch { z, left, memory, obs, n } = states;
         if n == 0 {
             return Ok(());
         }
@@ -212,6 +258,10 @@ impl Policy {
         if !left.is_empty() {
             LearnError::check("remaining shares of skills", n, left.len())?;
         }
+        let width = self.memory();
+        if width > 0 && !memory.is_empty() {
+            LearnError::check("memories", n * width, memory.len())?;
+        }
         let inputs = InputBuilder { z, latent: *latent, obs, kind, stats: self.stats.as_deref() };
         let chunk = match kind {
             ObsKind::Vector(_) => VECTORS_AT_A_TIME,
@@ -221,12 +271,24 @@ impl Policy {
             for start in (0..n).step_by(chunk) {
                 let rows: Vec<usize> = (start..(start + chunk).min(n)).collect();
                 let len = rows.len();
-                let x = self.actor.join(&inputs.input(&rows, &self.device))?;
-                let left = left.get(rows[0]..rows[0] + len).map(|left| vector(left.to_vec(), &self.device));
-                match len {
-                    1 => read(x.repeat_dim(0, 2), left.map(|left| left.repeat_dim(0, 2)), len)?,
-                    _ => read(x, left, len)?,
+                let (first, end) = (rows[0], rows[0] + len);
+                let mut x = self.actor.join(&inputs.input(&rows, &self.device))?;
+                let mut left = left.get(first..end).map(|left| vector(left.to_vec(), &self.device));
+                let mut before = memory.get(first * width..end * width).unwrap_or_default().to_vec();
+                before.resize(len * width, 0.0);
+                let rows = len.max(2);
+                if len == 1 {
+                    (x, left) = (x.repeat_dim(0, 2), left.map(|left| left.repeat_dim(0, 2)));
+                    before.extend_from_within(..);
                 }
+                let read_by_layers = match &self.actor.memory {
+                    None => (x, None),
+                    Some(memory) => {
+                        let (x, after) = memory.step(x, matrix(before, rows, width, &self.device));
+                        (x, Some(after))
+                    }
+                };
+                read(read_by_layers, left, len)?;
             }
             Ok(())
         };
@@ -249,6 +311,8 @@ pub struct PolicyOutput {
     pub log_std: Vec<f32>,
     /// Estimated returns, `n`; zeros if the policy has no critic.
     pub values: Vec<f32>,
+    /// What the policy remembers after these observations, `n * memory`; empty without memory.
+    pub memory: Vec<f32>,
 }
 
 impl PolicyOutput {
@@ -337,13 +401,15 @@ impl PolicyOutput {
     /// # Panics
     /// If there are more rows in `sizes` than [`Self::len`].
     pub fn split(mut self, sizes: &[usize]) -> Vec<Self> {
-        let (dim, stds) = (self.space.dim(), self.log_std.len().checked_div(self.len()).unwrap_or_default());
+        let per_row = |numbers: &[f32]| numbers.len().checked_div(self.len()).unwrap_or_default();
+        let (dim, stds, memory) = (self.space.dim(), per_row(&self.log_std), per_row(&self.memory));
         let parts = sizes.iter().map(|&rows| Self {
             space: self.space,
             squashed: self.squashed,
             head: self.head.drain(..rows * dim).collect(),
             log_std: self.log_std.drain(..rows * stds).collect(),
             values: self.values.drain(..rows).collect(),
+            memory: self.memory.drain(..rows * memory).collect(),
         });
         parts.collect()
     }
@@ -385,6 +451,7 @@ mod tests {
             head: vec![mean],
             log_std: vec![std.ln()],
             values: vec![0.0],
+            memory: Vec::new(),
         }
     }
 
@@ -451,6 +518,7 @@ mod tests {
             log_std: Vec::new(),
             values: vec![5.0, 6.0],
             squashed: false,
+            memory: Vec::new(),
         };
         let parts = discrete.split(&[1, 1]);
         assert_eq!((&parts[1].head[..], &parts[1].values[..]), (&[3.0, 4.0][..], &[6.0][..]));

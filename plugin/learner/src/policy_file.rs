@@ -63,7 +63,7 @@ impl PolicyFile {
             skills: self.skills.as_ref().map(SkillsShape::of).transpose().map_err(learner)?,
             examples: n,
         };
-        let states = StateBatch { z, left: &[], obs, n };
+        let states = StateBatch { z, left: &[], memory: &[], obs, n };
         let examples = Examples::of(self, states).map_err(learner)?;
         let mut file = TensorFile::new(path, FILE, &header)?;
         file.put_network("actor", &policy.actor)?;
@@ -206,7 +206,7 @@ impl PolicyShape {
     fn spec(&self) -> PolicySpec {
         let net = &self.actor.net;
         PolicySpec {
-            obs: self.image.map_or(ObsKind::Vector(net.obs_dim), ObsKind::Image),
+            obs: self.image.map_or(ObsKind::Vector(self.actor.seen()), ObsKind::Image),
             latent: net.latent,
             action_space: self.action_space,
         }
@@ -375,7 +375,7 @@ impl Examples {
             ObsKind::Image(_) => Observations::Image(file.take_bytes(OBSERVATIONS, &shape)?),
         };
         let z = file.take("examples.z", &[n, policy.latent()])?;
-        let states = StateBatch { z: &z, left: &[], obs: obs.as_slice(), n };
+        let states = StateBatch { z: &z, left: &[], memory: &[], obs: obs.as_slice(), n };
         let examples = Self::of(read, states).map_err(|source| file.learner(source))?;
         for Output { name, width, numbers } in examples.outputs {
             let expected = file.take(&format!("examples.{name}"), &[n, width])?;

@@ -4,6 +4,7 @@
 //!
 //! - `config`: settings of PPO.
 //! - `batch`: the data of an update: a rollout with its advantages, and its minibatches in host memory.
+//! - `sequences`: sequences of a rollout, for policies that remember.
 //! - `objective`: the formulas of PPO: generalised advantage estimation on the host, and the losses as pure functions
 //!   of tensors.
 //! - `schedule`: the learning rate and the penalty's weight of each update.
@@ -18,6 +19,7 @@ mod metrics;
 mod objective;
 mod on_device;
 mod schedule;
+mod sequences;
 mod step;
 
 use crate::{
@@ -26,12 +28,13 @@ use crate::{
     file::{FileKind, TensorFile},
     learner::{Checkpoint, ContinuedSchedule, Learner, LearnerBase, LearnerMetrics},
     nn::{Adam, AdamConfig, ParamVisitor, Parameters, RandomInit, path, tracked},
-    policy::{Actor, ActorShape, Critic, NetShape, Policy, StateBatch, StdShape},
+    policy::{Actor, ActorShape, Critic, Memory, NetShape, Policy, StateBatch, StdShape},
     ppo::{
         batch::{Batch, JoinedRows, minibatches},
         metrics::Has,
         on_device::{Reports, SentRollout, images_at_a_time},
         schedule::{Schedule, TakenUp},
+        sequences::{minibatches_of, sequences},
         step::{UpdateSettings, step_in_parts},
     },
     rng::ChaCha8Rng,
@@ -131,6 +134,11 @@ impl PpoLearner {
         &self.config
     }
 
+    /// Returns the networks.
+    pub fn nets(&self) -> &PpoNets {
+        &self.nets
+    }
+
     /// Reads a file that [`Learner::save`] wrote. The learner continues exactly as the saved one would have.
     ///
     /// # Errors
@@ -181,7 +189,7 @@ impl Learner for PpoLearner {
 
     fn initial_kl(&self, z: &[f32], obs: ObsSlice<'_>, n: usize) -> Result<Option<f32>, LearnError> {
         let is_copy = self.base.updates == 0 && !self.is_continuation;
-        self.base.initial_kl(&self.policy(), is_copy, StateBatch { z, left: &[], obs, n })
+        self.base.initial_kl(&self.policy(), is_copy, StateBatch { z, left: &[], memory: &[], obs, n })
     }
 
     /// Saves the learner. Weights are called `actor.l0.weight` (`[inputs, outputs]`), moments
@@ -222,6 +230,8 @@ impl PpoLearner {
 
     fn update_here(&mut self, rollout: &Rollout) -> Result<UpdateMetrics, LearnError> {
         rollout.check_for(&self.base.spec, self.base.rollout_latent())?;
+        let remembered = rollout.rows() * self.nets.actor.memory.as_ref().map_or(0, Memory::width);
+        LearnError::check("memory of the rollout", remembered, rollout.memory.len())?;
         let rewards = match &mut self.base.rewards {
             Some(normalizer) => normalizer.normalize(&rollout.rewards, &rollout.done(), rollout.envs)?,
             None => rollout.rewards.clone(),
@@ -250,10 +260,15 @@ impl PpoLearner {
         let moment = UpdateSettings { lr, score: score.as_ref(), is_warming_up };
         let mut rng = self.base.streams.stream("ppo.minibatches", self.base.updates);
         let before = self.adam.spent();
-        let sum = if is_host(&self.base.device.plain()) {
-            self.steps(&batch, &mut rng, &moment)?
-        } else {
-            self.steps_on_device(&batch, &mut rng, &moment)?
+        let (sum, steps) = match self.config.memory.sequences() {
+            Some(sequences) => self.steps_over_sequences(&batch, sequences, &mut rng, &moment)?,
+            None => {
+                let sum = match is_host(&self.base.device.plain()) {
+                    true => self.steps(&batch, &mut rng, &moment)?,
+                    false => self.steps_on_device(&batch, &mut rng, &moment)?,
+                };
+                (sum, self.config.epochs * self.config.minibatches.min(rollout.rows()))
+            }
         };
         self.base.updates += 1;
         let times = &mut self.base.times;
@@ -263,7 +278,6 @@ impl PpoLearner {
         if let (Some(normalizer), Observations::Vector(values)) = (&mut self.base.observations, &rollout.obs) {
             normalizer.update(values);
         }
-        let steps = self.config.epochs * self.config.minibatches.min(rollout.rows());
         let has = Has { penalty: batch.teacher.is_some(), augmentation: !self.config.augment.is_empty() };
         Ok(UpdateMetrics::mean(&sum, steps, has, explained_variance, lr))
     }
@@ -327,6 +341,26 @@ impl PpoLearner {
         Ok(sum)
     }
 
+    /// Does the gradient steps of a policy that remembers. Returns the sum of their metrics, and their number.
+    fn steps_over_sequences(
+        &mut self,
+        batch: &Batch<'_>,
+        (length, burn_in): (usize, usize),
+        rng: &mut ChaCha8Rng,
+        moment: &UpdateSettings<'_>,
+    ) -> Result<(StepMetrics, usize), LearnError> {
+        let device = self.base.device.plain();
+        let all = sequences(batch.rollout, length, burn_in);
+        let (epochs, count) = (self.config.epochs, self.config.minibatches.min(all.len()));
+        let mut sum = StepMetrics::default();
+        for sequences in minibatches_of(all, epochs, count, rng) {
+            let parts = batch.parts_of_sequences(&sequences, self.nets.actor.cnn.as_ref(), moment, &device);
+            let step = step_in_parts(&mut self.nets, &mut self.adam, parts, &self.config, moment)?;
+            sum.add(&step, 1.0);
+        }
+        Ok((sum, epochs * count))
+    }
+
     fn steps_on_device(
         &mut self,
         batch: &Batch<'_>,
@@ -349,7 +383,8 @@ impl PpoLearner {
     fn teacher_output(&self, rollout: &Rollout) -> Result<Option<TeacherOutput>, LearnError> {
         let Some(teacher) = &self.base.teacher else { return Ok(None) };
         let mut rng = self.base.streams.stream("score.own_samples", self.base.updates);
-        let states = StateBatch { z: &rollout.z, left: &[], obs: rollout.obs.as_slice(), n: rollout.rows() };
+        let states =
+            StateBatch { z: &rollout.z, left: &[], memory: &[], obs: rollout.obs.as_slice(), n: rollout.rows() };
         teacher.output(states, (&rollout.actions, &rollout.legal), false, &mut rng, self.base.device)
     }
 }
@@ -387,7 +422,15 @@ impl PpoNets {
     fn fresh(config: &PpoConfig, base: &LearnerBase) -> Result<Self, LearnError> {
         let (shape, device) = (actor_shape(config, base), base.device.plain());
         let actor = match base.copied_teacher() {
-            Some(teacher) => teacher.origin().clone(),
+            Some(teacher) => {
+                let origin = teacher.origin().clone();
+                let mut rng = base.streams.stream("ppo.memory", 0);
+                let source = RandomInit { rng: &mut rng, device: &device };
+                match config.memory.shape() {
+                    Some(memory) => origin.with_new_memory(base.spec.latent, memory, source),
+                    None => origin,
+                }
+            }
             None => shape.fresh(&base.spec, &base.streams, "ppo.actor", &device)?,
         };
         let mut rng = base.streams.stream("ppo.critic", 0);
@@ -411,10 +454,11 @@ impl PpoNets {
 
 /// Returns the layers of the network that it copies, if it is a copy, else those of the settings.
 fn actor_shape(config: &PpoConfig, base: &LearnerBase) -> ActorShape {
-    match base.copied_teacher() {
+    let shape = match base.copied_teacher() {
         Some(teacher) => teacher.shape(),
         None => ActorShape::new(&base.spec, &config.cnn, &config.hidden, config.activation, StdShape::Vector),
-    }
+    };
+    shape.with_memory(config.memory.shape())
 }
 
 /// Returns the shape of the critic, which reads the same inputs as the actor's layers, through layers of its own.

@@ -23,6 +23,8 @@ pub struct Rollout {
     /// The remaining share of that skill's ticks, this one included, above 0 and up to 1, `T * B`. Empty if ticks are
     /// not counted: all skills count as newly drawn then.
     pub left: Vec<f32>,
+    /// What the policy remembered before each step, `T * B * memory`; empty for a policy without memory.
+    pub memory: Vec<f32>,
     /// The actions taken, `T * B`.
     pub actions: Actions,
     /// True for each discrete action that was legal, `T * B * choices`. Empty if all were, or actions are continuous.
@@ -81,6 +83,7 @@ impl Rollout {
             obs: Observations::empty(&obs_kind),
             z: Vec::new(),
             left: Vec::new(),
+            memory: Vec::new(),
             actions: Actions::empty(space),
             legal: Vec::new(),
             log_probs: Vec::new(),
@@ -112,6 +115,7 @@ impl Rollout {
         for values in [
             &mut self.z,
             &mut self.left,
+            &mut self.memory,
             &mut self.log_probs,
             &mut self.values,
             &mut self.rewards,
@@ -146,6 +150,11 @@ impl Rollout {
         self.left.extend_from_slice(left);
     }
 
+    /// Adds what the policy remembered before the newest step, `B * memory`.
+    pub fn push_memory(&mut self, memory: &[f32]) {
+        self.memory.extend_from_slice(memory);
+    }
+
     /// Adds the mask of the newest step, `B * choices`, or nothing if the game has none.
     ///
     /// # Panics
@@ -162,6 +171,11 @@ impl Rollout {
     /// Returns the number of discrete actions that its mask is about; 0 without a mask.
     pub(crate) fn choices(&self) -> usize {
         self.legal.len().checked_div(self.rows()).unwrap_or_default()
+    }
+
+    /// Returns the numbers that the policy remembers; 0 without memory.
+    pub(crate) fn memory_width(&self) -> usize {
+        self.memory.len().checked_div(self.rows()).unwrap_or_default()
     }
 
     /// Adds one tick.
@@ -206,13 +220,15 @@ impl Rollout {
         ends.next_obs.as_slice().check_size("rollout ends next_obs", &self.obs_kind, self.envs)?;
         LearnError::check("rollout ends next_z", self.envs * latent, ends.next_z.len())?;
         let (mut obs, mut z, mut left) = (ends.cut_obs.clone(), ends.cut_z.clone(), ends.cut_left.clone());
+        let (mut memory, remembered) = (ends.cut_memory.clone(), self.memory_width());
         for &env in &running {
             obs.push(ends.next_obs.row(env, width))?;
             z.extend_from_slice(&ends.next_z[env * latent..(env + 1) * latent]);
             left.extend(ends.next_left.get(env));
+            memory.extend(ends.next_memory.get(env * remembered..(env + 1) * remembered).unwrap_or_default());
         }
         let cuts = ends.cut_rows.len();
-        let values = policy.values_held(&z, &left, &obs, cuts + running.len())?;
+        let values = policy.values_remembering(&z, &left, &memory, &obs, cuts + running.len())?;
         for (&row, &value) in ends.cut_rows.iter().zip(&values) {
             self.final_values[row] = value;
         }
@@ -259,6 +275,16 @@ impl Rollout {
                 LearnError::check(name, expected, left.len())?;
             }
         }
+        let width = self.memory_width();
+        for (name, expected, memory) in [
+            ("rollout memory", rows * width, &self.memory),
+            ("rollout ends cut_memory", cuts * width, &self.ends.cut_memory),
+            ("rollout ends next_memory", self.envs * width, &self.ends.next_memory),
+        ] {
+            if !memory.is_empty() {
+                LearnError::check(name, expected, memory.len())?;
+            }
+        }
         let cut_rows = &self.ends.cut_rows;
         if let Some(row) = cut_rows.iter().find(|row| **row >= rows) {
             return Err(LearnError::Config(format!("rollout ends: row {row} is listed, but there are {rows} rows")));
@@ -297,6 +323,7 @@ impl Rollout {
         for (name, width, values) in [
             ("rollout z", self.latent, &self.z),
             ("rollout left", 1, &self.left),
+            ("rollout memory", self.memory_width(), &self.memory),
             ("rollout rewards", 1, &self.rewards),
             ("rollout ends cut_z", self.latent, &ends.cut_z),
             ("rollout ends next_z", self.latent, &ends.next_z),
@@ -407,6 +434,8 @@ pub struct EndStates {
     pub cut_z: Vec<f32>,
     /// Remaining share of that skill, as in [`Rollout::left`].
     pub cut_left: Vec<f32>,
+    /// What the policy remembers before that observation, `cut_rows * memory`, or empty.
+    pub cut_memory: Vec<f32>,
     /// The mask in that state, as in [`Rollout::legal`].
     pub cut_legal: Vec<bool>,
     /// Observation after the last row of each environment, `B`; zeros where that row ended an episode.
@@ -415,6 +444,8 @@ pub struct EndStates {
     pub next_z: Vec<f32>,
     /// Remaining share of that skill, `B`, or empty.
     pub next_left: Vec<f32>,
+    /// What the policy remembers before it, `B * memory`, or empty.
+    pub next_memory: Vec<f32>,
     /// The mask in that state, `B * choices`, or empty.
     pub next_legal: Vec<bool>,
 }
@@ -429,10 +460,12 @@ impl EndStates {
             cut_obs: none(),
             cut_z: empty(),
             cut_left: empty(),
+            cut_memory: empty(),
             cut_legal: Vec::new(),
             next_obs: none(),
             next_z: empty(),
             next_left: empty(),
+            next_memory: empty(),
             next_legal: Vec::new(),
         }
     }
@@ -443,10 +476,12 @@ impl EndStates {
         self.cut_obs.clear();
         self.cut_z.clear();
         self.cut_left.clear();
+        self.cut_memory.clear();
         self.cut_legal.clear();
         self.next_obs.clear();
         self.next_z.clear();
         self.next_left.clear();
+        self.next_memory.clear();
         self.next_legal.clear();
     }
 }
@@ -504,6 +539,7 @@ impl Rollout {
             all.ends.next_obs.push(&part.ends.next_obs)?;
             all.ends.next_z.extend_from_slice(&part.ends.next_z);
             all.ends.next_left.extend_from_slice(&part.ends.next_left);
+            all.ends.next_memory.extend_from_slice(&part.ends.next_memory);
         }
         for t in 0..first.steps {
             for part in parts {
@@ -511,6 +547,8 @@ impl Rollout {
                 all.actions.extend_rows(&part.actions, rows.start, rows.end)?;
                 all.z.extend_from_slice(&part.z[rows.start * part.latent..rows.end * part.latent]);
                 all.left.extend_from_slice(part.left.get(rows.clone()).unwrap_or_default());
+                let width = part.memory_width();
+                all.memory.extend_from_slice(&part.memory[rows.start * width..rows.end * width]);
                 let legal = part.legal.get(rows.start * choices..rows.end * choices).unwrap_or_default();
                 let before = all.rewards.len();
                 legal::extend(&mut all.legal, before, legal, part.envs, choices);
@@ -542,6 +580,9 @@ impl Rollout {
             self.ends.cut_rows.push(row);
             self.ends.cut_obs.push(part.ends.cut_obs.row(i, self.obs_kind.numbers()))?;
             self.ends.cut_left.extend(part.ends.cut_left.get(i));
+            let width = part.memory_width();
+            let memory = part.ends.cut_memory.get(i * width..(i + 1) * width);
+            self.ends.cut_memory.extend_from_slice(memory.unwrap_or_default());
             let legal = part.ends.cut_legal.get(i * choices..(i + 1) * choices).unwrap_or_default();
             legal::extend(&mut self.ends.cut_legal, self.ends.cut_rows.len() - 1, legal, 1, choices);
             self.ends.cut_z.extend_from_slice(&part.ends.cut_z[i * self.latent..(i + 1) * self.latent]);

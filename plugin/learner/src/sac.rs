@@ -257,7 +257,7 @@ impl Learner for SacLearner {
     /// Returns the divergence of the actor, also while random actions are played.
     fn initial_kl(&self, z: &[f32], obs: ObsSlice<'_>, n: usize) -> Result<Option<f32>, LearnError> {
         let actor = self.base.snapshot(&self.nets.actor, None);
-        self.base.initial_kl(&actor, self.gradient_steps == 0, StateBatch { z, left: &[], obs, n })
+        self.base.initial_kl(&actor, self.gradient_steps == 0, StateBatch { z, left: &[], memory: &[], obs, n })
     }
 
     /// Saves the learner. Weights are called `actor.l0.weight`, `q1.l0.weight`, `target.q1.l0.weight` and `log_alpha`

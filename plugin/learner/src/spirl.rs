@@ -14,10 +14,10 @@ mod over_skills;
 mod skill_steps;
 
 use crate::{
-    DeviceKind, FileError, LearnError, ObsSlice, PolicySpec, PpoLearner, Rollout, SacLearner, TimeLimit,
+    DeviceKind, FileError, LearnError, ObsSlice, PolicySpec, PpoLearner, Rollout, SacLearner, SettingError, TimeLimit,
     file::{FileKind, TensorFile},
     learner::{ContinuedSchedule, LearnTimes, Learner, LearnerBase, LearnerMetrics},
-    policy::Policy,
+    policy::{MemoryKind, Policy},
     ppo::PpoConfig,
     sac::{EntropyCoef, SacConfig},
     score::{PriorKind, ScoreConfig, Teacher, TiedTo},
@@ -58,6 +58,7 @@ impl SpirlLearner {
         device: DeviceKind,
     ) -> Result<Self, LearnError> {
         check(&config, score, ppo.time_limit)?;
+        check_memory(&ppo)?;
         let below = PpoLearner::below(&config, &ppo, score, model, seed, device)?;
         let (gamma, ent_coef) = (ppo.gamma.powi(score.skill_interval as i32), 0.0);
         let ppo = PpoConfig { gamma, ent_coef, ..ppo };
@@ -82,6 +83,7 @@ impl SpirlLearner {
         device: DeviceKind,
     ) -> Result<Self, LearnError> {
         check(&config, score, sac.time_limit)?;
+        check_memory(ppo)?;
         if !model.config().tanh_latent {
             return Err(LearnError::Config(
                 "spirl by SAC squashes skills: it needs a skill model with tanh_latent".to_owned(),
@@ -130,6 +132,14 @@ impl PpoLearner {
     ) -> Result<Option<Self>, LearnError> {
         let learner = || Self::with_skill(ppo.clone(), score.clone(), model, seed, device);
         config.learn_decoder.then(learner).transpose()
+    }
+}
+
+/// Checks that no memory is asked for: a policy over skills has none.
+fn check_memory(ppo: &PpoConfig) -> Result<(), LearnError> {
+    match ppo.memory {
+        MemoryKind::None => Ok(()),
+        _ => Err(SettingError::new("ppo.memory", "must be None for spirl, whose policy acts once per skill").into()),
     }
 }
 

@@ -12,7 +12,7 @@ use crate::{
     level::LevelQueue,
     observation::VectorSensor,
     placement::{TickPlacement, TickSchedules},
-    policy::ActionDraw,
+    policy::{ActionDraw, AgentMemory},
     policy_file::{GameMetadata, check_policy, install_policy},
     skill_prior::ActiveSkill,
     streams::AgentStreams,
@@ -32,7 +32,7 @@ pub(super) fn start(world: &mut World, path: &Path) -> Result<Vec<Seat>, Takeove
     let seats: Vec<Seat> = agents.iter().filter_map(|&agent| Seat::of(world, agent)).collect();
     for agent in agents {
         world.entity_mut(agent).insert(Control::Policy);
-        forget_skill(world, agent);
+        forget(world, agent);
     }
     Ok(seats)
 }
@@ -40,7 +40,7 @@ pub(super) fn start(world: &mut World, path: &Path) -> Result<Vec<Seat>, Takeove
 /// Replaces the policy that plays by a newer one.
 pub(super) fn reload(world: &mut World, path: &Path) -> Result<(), TakeoverError> {
     for agent in install(world, path)? {
-        forget_skill(world, agent);
+        forget(world, agent);
     }
     Ok(())
 }
@@ -60,7 +60,7 @@ fn install(world: &mut World, path: &Path) -> Result<Vec<Entity>, TakeoverError>
 /// Gives the agents back.
 pub(super) fn stop(world: &mut World, seats: Vec<Seat>) {
     for seat in seats {
-        forget_skill(world, seat.agent);
+        forget(world, seat.agent);
         seat.give_back(world);
     }
 }
@@ -239,9 +239,13 @@ impl Seat {
     }
 }
 
-/// Resets a skill: one that was drawn for another state does not fit this one.
-pub(super) fn forget_skill(world: &mut World, agent: Entity) {
+/// Resets skill and memory: a skill that was drawn for another state does not fit this one, and another policy remembers
+/// in other numbers.
+pub(super) fn forget(world: &mut World, agent: Entity) {
     if let Some(mut skill) = world.get_mut::<ActiveSkill>(agent) {
         skill.ticks_left = 0;
+    }
+    if let Some(mut memory) = world.get_mut::<AgentMemory>(agent) {
+        memory.0.clear();
     }
 }

@@ -11,7 +11,7 @@ use bevy_playbot::{
     legal::LegalActions,
     level::LevelQueue,
     observation::Observation,
-    policy::{ActionDraw, ActivePolicy, Decision},
+    policy::{ActionDraw, ActivePolicy, AgentMemory, Decision},
     reward::Reward,
     skill_prior::{ActiveSkill, SkillPrior},
     state_hash::StateHash,
@@ -237,10 +237,12 @@ fn bootstrap_values(world: &mut World, policy: &Policy, rollout: &mut Rollout) -
         .collect();
     let kind = rollout.obs_kind;
     let (mut skills, mut left, mut observations) = (Vec::new(), Vec::new(), Observations::empty(&kind));
+    let (width, mut memory) = (policy.memory(), Vec::new());
     for &row in &running {
         push_state(world, entities[row], &mut skills, &mut left, &mut observations);
+        push_memory(world, entities[row], width, &mut memory);
     }
-    let values = policy.values_held(&skills, &left, &observations, running.len())?;
+    let values = policy.values_remembering(&skills, &left, &memory, &observations, running.len())?;
     let latent = rollout.latent;
     rollout.next_values = vec![0.0; entities.len()];
     rollout.ends.next_obs = Observations::zeros(&kind, entities.len());
@@ -248,11 +250,13 @@ fn bootstrap_values(world: &mut World, policy: &Policy, rollout: &mut Rollout) -
     // A prior may exist without running agents.
     let counted = if world.contains_resource::<SkillPrior>() { entities.len() } else { 0 };
     rollout.ends.next_left = vec![1.0; counted];
+    rollout.ends.next_memory = vec![0.0; entities.len() * width];
     for (i, (&row, value)) in running.iter().zip(values).enumerate() {
         rollout.next_values[row] = value;
         if let Some(&left) = left.get(i) {
             rollout.ends.next_left[row] = left;
         }
+        rollout.ends.next_memory[row * width..(row + 1) * width].copy_from_slice(&memory[i * width..(i + 1) * width]);
         rollout.ends.next_obs.set_row(row, observations.row(i, kind.numbers()))?;
         rollout.ends.next_z[row * latent..(row + 1) * latent].copy_from_slice(&skills[i * latent..(i + 1) * latent]);
     }
@@ -278,6 +282,7 @@ fn collect_tick(world: &mut World) {
         }
         let tick = tick_of(world, &entities, AgentsTick::new(&policy, &kind))?;
         collecting.rollout.push_left(world.resource::<PolicyBatch>().left());
+        collecting.rollout.push_memory(world.resource::<PolicyBatch>().memory());
         push_tick(&mut collecting.rollout, &tick, &final_values, &cut)?;
         collecting.rollout.push_legal(world.resource::<PolicyBatch>().legal());
         Ok::<(), LearnError>(())
@@ -320,6 +325,7 @@ fn push_tick(
         rollout.push_cut(row, cut.obs.row(i, width), z)?;
         rollout.ends.cut_left.extend(cut.left.get(i));
     }
+    rollout.ends.cut_memory.extend_from_slice(&cut.memory);
     rollout.ends.cut_legal.extend_from_slice(&cut.legal);
     Ok(())
 }
@@ -375,6 +381,8 @@ pub(crate) struct CutEpisodes {
     pub(crate) z: Vec<f32>,
     /// Remaining ticks of these skills; empty without a prior.
     pub(crate) left: Vec<f32>,
+    /// What the policy remembers of these episodes; empty without memory.
+    pub(crate) memory: Vec<f32>,
     /// Masks of their actions; empty without any.
     pub(crate) legal: Vec<bool>,
     pub(crate) values: Vec<f32>,
@@ -382,8 +390,8 @@ pub(crate) struct CutEpisodes {
 
 impl CutEpisodes {
     pub(crate) fn new(agents: Vec<usize>, kind: &ObsKind) -> Self {
-        let (z, left, legal, values) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self { agents, obs: Observations::empty(kind), z, left, legal, values }
+        let (z, left, memory, values) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Self { agents, obs: Observations::empty(kind), z, left, memory, legal: Vec::new(), values }
     }
 }
 
@@ -411,6 +419,7 @@ pub(crate) fn cut_episodes(
     for (i, &row) in cut.agents.iter().enumerate() {
         let skill_from = cut.z.len();
         push_state(world, entities[row], &mut cut.z, &mut cut.left, &mut cut.obs);
+        push_memory(world, entities[row], policy.memory(), &mut cut.memory);
         let held = world.get::<ActiveSkill>(entities[row]).is_some_and(|skill| skill.ticks_left > 0);
         let streams = world.get::<AgentStreams>(entities[row]);
         if let (false, Some(prior), Some(streams)) = (held, world.get_resource::<SkillPrior>(), streams) {
@@ -421,7 +430,7 @@ pub(crate) fn cut_episodes(
         }
     }
     cut.legal = masks(world, cut.agents.iter().map(|&row| entities[row]));
-    cut.values = policy.values_held(&cut.z, &cut.left, &cut.obs, cut.agents.len())?;
+    cut.values = policy.values_remembering(&cut.z, &cut.left, &cut.memory, &cut.obs, cut.agents.len())?;
     // The current row belongs to the state before the action.
     for (&entity, before) in entities.iter().zip(before) {
         if let (Some(before), Some(mut observation)) = (before, world.get_mut::<Observation>(entity)) {
@@ -444,6 +453,15 @@ pub(crate) fn push_state(
         left.extend(world.get_resource::<SkillPrior>().map(|prior| skill.left(prior.skill_interval)));
         observation.push_to(observations);
     }
+}
+
+/// Adds what an agent's policy, which remembers `width` numbers, remembers of its present episode.
+fn push_memory(world: &World, entity: Entity, width: usize, all: &mut Vec<f32>) {
+    let begun = world.get::<Episode>(entity).is_some_and(|episode| episode.tick > 0);
+    let memory = world.get::<AgentMemory>(entity).filter(|memory| begun && memory.0.len() == width);
+    let end = all.len() + width;
+    all.extend_from_slice(memory.map_or(&[], |memory| &memory.0));
+    all.resize(end, 0.0);
 }
 
 /// Returns the masks of agents in their present states, one after the other; nothing if no agent has one. All actions
@@ -476,6 +494,8 @@ pub struct ArenaState {
     state_hash: u64,
     skill: Vec<f32>,
     skill_ticks_left: u32,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    memory: Vec<f32>,
     streams: [RngState; 3],
 }
 
@@ -512,16 +532,18 @@ pub enum RestoreError {
 pub fn save_arenas(collector: &mut Collector) -> Vec<ArenaState> {
     let agents = collector.agents().to_vec();
     let world = collector.world_mut();
-    let mut query = world.query::<(&Agent, &Episode, &ActionLog, &ActiveSkill, &AgentStreams, &StateHash)>();
+    let mut query =
+        world.query::<(&Agent, &Episode, &ActionLog, &ActiveSkill, &AgentStreams, &StateHash, &AgentMemory)>();
     agents
         .iter()
         .filter_map(|&agent| query.get(world, agent).ok())
-        .map(|(agent, episode, log, skill, streams, hash)| ArenaState {
+        .map(|(agent, episode, log, skill, streams, hash, memory)| ArenaState {
             level: episode.is_running().then_some(episode.level),
             actions: collect_actions(&agent.actions, &log.0),
             state_hash: hash.0,
             skill: skill.z.clone(),
             skill_ticks_left: skill.ticks_left,
+            memory: memory.0.clone(),
             streams: [&streams.level, &streams.action, &streams.skill].map(RngState::of),
         })
         .collect()
@@ -570,7 +592,7 @@ pub fn restore_arenas(collector: &mut Collector, saved: &[ArenaState]) -> Result
         let streams = AgentStreams::restored(level.restore()?, action.restore()?, skill.restore()?);
         let active = ActiveSkill { z: state.skill.clone(), ticks_left: state.skill_ticks_left };
         let log = ActionLog((0..state.actions.len()).filter_map(|tick| state.actions.get(tick)).collect());
-        entity.insert((Control::Policy, streams, active, log));
+        entity.insert((Control::Policy, streams, active, log, AgentMemory(state.memory.clone())));
         if let Some(queue) = &queues[row] {
             entity.insert(queue.clone());
         }

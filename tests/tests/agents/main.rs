@@ -14,6 +14,8 @@ mod findings;
 mod lander;
 mod leaps;
 mod level_detectors;
+mod level_detectors;
+mod memories;
 mod one_world;
 mod orders;
 mod paused;

@@ -13,6 +13,7 @@ use bevy_playbot::{
     engine::{PressesForPeople, flush_unfinished},
     key_bindings::KeyBindings,
     lesson::{Lesson, LessonNews, lesson_command},
+    policy::AgentMemory,
     policy_file::{DeviceKind, PolicyFile, install_policy},
 };
 use playbot_harness::prelude::*;
@@ -178,6 +179,9 @@ fn load(world: &mut World, file: &Path) -> Result<bool, String> {
     if let Some(mut skill) = world.get_mut::<ActiveSkill>(agent) {
         // The new decoder means something else by a skill of the old one.
         skill.ticks_left = 0;
+    }
+    if let Some(mut memory) = world.get_mut::<AgentMemory>(agent) {
+        memory.0.clear();
     }
     Ok(is_first)
 }

@@ -63,6 +63,7 @@ pub fn ppo(criterion: &mut Criterion) {
     let batch = Minibatch {
         inputs: Tensor::<2>::from_data(inputs, &device).into(),
         augmented: None,
+        recall: None,
         left: None,
         logit_offsets: None,
         ppo: PpoBatch {

@@ -192,6 +192,13 @@ impl Mlp {
         self.layers.first().unwrap_or(&self.head).weight.dims()[0]
     }
 
+    /// Adds inputs behind the others whose weights are 0: they change no output yet.
+    pub(crate) fn add_inputs(&mut self, count: usize) {
+        let first = self.layers.first_mut().unwrap_or(&mut self.head);
+        let zeros = Tensor::zeros([count, first.weight.dims()[1]], &first.weight.device());
+        first.weight = Tensor::cat(vec![first.weight.clone(), zeros], 0);
+    }
+
     /// Returns the last hidden layer's activations, `[n, inputs]` to `[n, hidden]`.
     pub fn features(&self, x: Tensor<2>) -> Tensor<2> {
         Linear::chain(x, &self.hidden().collect::<Vec<_>>())

@@ -5,15 +5,21 @@ use crate::{
     file::TensorFile,
     nn::{
         CnnKind, Dist, ImageNet, Init, Linear, Mlp, ObsBatch, ParamSource, ParamVisitor, Parameters, RandomInit,
-        bounded_log_std, path,
+        bounded_log_std, frozen, path,
     },
-    policy::NetInput,
+    policy::{
+        NetInput,
+        memory::{Memory, MemoryShape, Recall},
+    },
     rng::Streams,
 };
 use burn::tensor::{Device, Tensor};
 use playbot_kernels::elementwise::Activation;
 use rand::Rng;
 use serde::{Deserialize, Serialize};
+
+/// Name of the memory, behind the name of its actor.
+const MEMORY: &str = "memory";
 
 /// Bounds of a state-dependent log-std.
 const LOG_STD_RANGE: (f32, f32) = (-10.0, 2.0);
@@ -55,6 +61,8 @@ pub enum LogStd {
 pub struct Actor {
     /// The trunk that reads images, `cnn` in names; `None` for vectors.
     pub cnn: Option<ImageNet>,
+    /// The memory, `memory` in names, which actor and critic share; `None` without.
+    pub memory: Option<Memory>,
     /// Hidden layers and the head.
     pub net: Mlp,
     /// ln σ, for continuous actions.
@@ -110,11 +118,24 @@ impl Actor {
                 LogStd::Vector(source.param(&name, [dim], Init::Zeros)?)
             }
         };
-        Ok(Self { cnn: None, net, log_std })
+        Ok(Self { cnn: None, memory: None, net, log_std })
     }
 
-    /// Returns the width of the observation behind a skill of width `latent`: the numbers of a vector, or the
-    /// features of an image.
+    /// Adds a memory, behind skills of width `latent`, that has no effect on the outputs yet.
+    pub(crate) fn with_new_memory(
+        mut self,
+        latent: usize,
+        shape: MemoryShape,
+        mut source: RandomInit<'_, impl Rng>,
+    ) -> Self {
+        let seen = self.obs_dim(latent);
+        let Ok(memory) = Memory::build(&mut source, "", (latent, seen), shape);
+        self.net.add_inputs(shape.width(seen));
+        Self { memory: Some(memory), ..self }
+    }
+
+    /// Returns the width of what its layers read behind a skill of width `latent`: the numbers of a vector or the
+    /// features of an image, and the memory.
     pub(crate) fn obs_dim(&self, latent: usize) -> usize {
         self.net.inputs() - latent
     }
@@ -154,8 +175,23 @@ impl Actor {
         })
     }
 
+    /// Returns joined inputs with the memory of each behind them, for an actor with memory; other inputs unchanged.
+    ///
+    /// # Errors
+    /// As [`Self::observe`], for the ticks before the sequences.
+    pub fn recall(&self, x: Tensor<2>, recall: Option<&Recall>) -> Result<Tensor<2>, LearnError> {
+        let (Some(memory), Some(recall)) = (&self.memory, recall) else { return Ok(x) };
+        let mut initial = recall.initial.clone();
+        if let Some(burn_in) = &recall.burn_in {
+            let past = frozen(self);
+            let memory = frozen(memory);
+            initial = memory.warm(past.join(&burn_in.inputs)?, burn_in, initial);
+        }
+        Ok(memory.recall(x, recall, initial))
+    }
+
     /// Returns the distributions for joined inputs `[z, s]`, `[n, latent + obs_dim]`, where s is the result of
-    /// [`Self::observe`].
+    /// [`Self::observe`]. Behind them is the memory, if there is one.
     pub fn forward(&self, x: Tensor<2>) -> Dist {
         self.forward_legal(x, None)
     }
@@ -195,6 +231,9 @@ impl Parameters for Actor {
     fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
         if let Some(cnn) = &mut self.cnn {
             cnn.visit(&path(prefix, "cnn"), visitor);
+        }
+        if let Some(memory) = &mut self.memory {
+            memory.visit(&path(prefix, MEMORY), visitor);
         }
         self.net.visit(prefix, visitor);
         match &mut self.log_std {
@@ -274,7 +313,7 @@ impl Parameters for Critic {
 /// Sizes of an actor's layers behind its trunk, or of a critic.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Eq, Debug)]
 pub struct NetShape {
-    /// Width of the observation, or the number of features of an image.
+    /// Width of the observation, or the number of features of an image, with the memory behind them.
     pub obs_dim: usize,
     /// Width of the skill z before the observation; 0 without skills.
     pub latent: usize,
@@ -343,6 +382,9 @@ pub(crate) struct ActorShape {
     /// The trunk that reads images; `None` for vectors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) cnn: Option<CnnKind>,
+    /// Its memory, if it has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) memory: Option<MemoryShape>,
 }
 
 impl ActorShape {
@@ -358,7 +400,20 @@ impl ActorShape {
             ObsKind::Vector(width) => (width, None),
             ObsKind::Image(_) => (cnn.features(), Some(cnn.clone())),
         };
-        Self { net: NetShape { obs_dim, latent: spec.latent, hidden: hidden.to_vec(), activation }, std, cnn }
+        let net = NetShape { obs_dim, latent: spec.latent, hidden: hidden.to_vec(), activation };
+        Self { net, std, cnn, memory: None }
+    }
+
+    /// Adds a memory, if any.
+    pub(crate) fn with_memory(mut self, memory: Option<MemoryShape>) -> Self {
+        let width = memory.map_or(0, |memory| memory.width(self.net.obs_dim));
+        self.net.obs_dim = self.net.obs_dim.saturating_add(width);
+        Self { memory, ..self }
+    }
+
+    /// Returns the width of the observations themselves, or the number of features.
+    pub(crate) fn seen(&self) -> usize {
+        self.memory.map_or(self.net.obs_dim, |memory| memory.seen(self.net.obs_dim))
     }
 
     /// Returns the shape of `actor`, which reads skills of width `latent`.
@@ -368,7 +423,12 @@ impl ActorShape {
             LogStd::State(_) => StdShape::State,
             LogStd::Squashed { range: (low, high), .. } => StdShape::Squashed(low, high),
         };
-        Self { net: NetShape::of(&actor.net, actor.obs_dim(latent)), std, cnn: actor.cnn.as_ref().map(ImageNet::kind) }
+        Self {
+            net: NetShape::of(&actor.net, actor.obs_dim(latent)),
+            std,
+            cnn: actor.cnn.as_ref().map(ImageNet::kind),
+            memory: actor.memory.as_ref().map(Memory::shape),
+        }
     }
 
     /// Returns the shape of `critic`, which reads the same inputs as an actor of this shape.
@@ -395,7 +455,8 @@ impl ActorShape {
         };
         let mut source = RandomInit { rng: &mut streams.stream(name, 0), device };
         let Ok(actor) = Actor::build(&mut source, "", &self.net, spec.action_space, self.std);
-        Ok(Actor { cnn, ..actor })
+        let Ok(memory) = self.memory(&mut source, "");
+        Ok(Actor { cnn, memory, ..actor })
     }
 
     /// Reads the actor of this shape called `name` out of a file.
@@ -417,7 +478,7 @@ impl ActorShape {
                 file.product(&prefix, &[image.channels, image.height, image.width])?;
                 let net = ImageNet::build(&mut file.params(device), &prefix, cnn, image)?;
                 let latent = self.net.latent;
-                InputWidths { obs_dim: cnn.features(), latent }.check(file, name, self.net.input_widths())?;
+                InputWidths { obs_dim: cnn.features(), latent }.check(file, name, self.seen_widths())?;
                 Some(net)
             }
             (None, ObsKind::Image(_)) => {
@@ -427,8 +488,23 @@ impl ActorShape {
                 return Err(file.format(format!("`{name}` reads images, but must read vectors")));
             }
         };
-        let actor = Actor::build(&mut file.params(device), name, &self.net, spec.action_space, self.std)?;
-        Ok(Actor { cnn, ..actor })
+        let source = &mut file.params(device);
+        let actor = Actor::build(source, name, &self.net, spec.action_space, self.std)?;
+        Ok(Actor { cnn, memory: self.memory(source, name)?, ..actor })
+    }
+
+    /// Creates the memory of the actor called `name`, if it has one, with parameters out of `source`.
+    fn memory<S: ParamSource>(&self, source: &mut S, name: &str) -> Result<Option<Memory>, S::Error> {
+        let widths = (self.net.latent, self.seen());
+        let build = |shape| Memory::build(source, &path(name, MEMORY), widths, shape);
+        // A damaged file may say anything.
+        let memory = self.memory.filter(|shape| shape.width(self.seen()) > 0);
+        memory.map(build).transpose()
+    }
+
+    /// Returns the widths of its inputs without the memory.
+    fn seen_widths(&self) -> InputWidths {
+        InputWidths { obs_dim: self.seen(), latent: self.net.latent }
     }
 }
 

@@ -39,6 +39,8 @@ pub(crate) struct StateBatch<'a> {
     pub(crate) z: &'a [f32],
     /// Remaining share of each skill, `n`, or empty, as in [`Rollout::left`](crate::Rollout::left).
     pub(crate) left: &'a [f32],
+    /// `n * memory`, or empty if all begin anew.
+    pub(crate) memory: &'a [f32],
     /// `n` observations.
     pub(crate) obs: ObsSlice<'a>,
     pub(crate) n: usize,

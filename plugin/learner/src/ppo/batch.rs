@@ -10,6 +10,7 @@ use crate::{
     ppo::{
         PpoConfig,
         objective::{PpoBatch, normalize_advantages},
+        sequences::{Sequence, pieces, recall, rows_of},
         step::{Minibatch, UpdateSettings},
     },
     rng::{ChaCha8Rng, shuffle},
@@ -98,12 +99,7 @@ impl Batch<'_> {
         moment: &UpdateSettings<'_>,
         device: &'b Device,
     ) -> impl Iterator<Item = (Minibatch, f64)> + 'b {
-        let start = Instant::now();
-        let mut advantages: Vec<f32> = rows.iter().map(|&r| self.advantages[r]).collect();
-        if self.norm_adv {
-            normalize_advantages(&mut advantages);
-        }
-        self.gathered(start);
+        let advantages = self.advantages_of(rows);
         // A loss that is no mean over rows has no parts.
         let most = cnn.filter(|_| moment.has_mean_loss()).map_or(rows.len(), ImageNet::images_at_a_time);
         (0..rows.len()).step_by(most.max(1)).map(move |first| {
@@ -114,6 +110,40 @@ impl Batch<'_> {
             self.gathered(start);
             (minibatch, share)
         })
+    }
+
+    /// Does [`Self::parts`] for the rows of sequences. A part has whole sequences.
+    pub(super) fn parts_of_sequences<'b>(
+        &'b self,
+        sequences: &'b [Sequence],
+        cnn: Option<&ImageNet>,
+        moment: &UpdateSettings<'_>,
+        device: &'b Device,
+    ) -> impl Iterator<Item = (Minibatch, f64)> + 'b {
+        let rows = rows_of(sequences, self.rollout.envs);
+        let mut advantages = self.advantages_of(&rows);
+        let most = cnn.filter(|_| moment.has_mean_loss()).map_or(rows.len(), ImageNet::images_at_a_time);
+        pieces(sequences, most).into_iter().map(move |piece| {
+            let start = Instant::now();
+            let part = rows_of(piece, self.rollout.envs);
+            let share = part.len() as f64 / rows.len() as f64;
+            let of_part = advantages.drain(..part.len()).collect();
+            let recall = Some(recall(piece, self.rollout, &self.inputs(), device));
+            let minibatch = Minibatch { recall, ..self.minibatch(&part, of_part, device) };
+            self.gathered(start);
+            (minibatch, share)
+        })
+    }
+
+    /// Returns the advantages of a minibatch, normalised if they are to be.
+    fn advantages_of(&self, rows: &[usize]) -> Vec<f32> {
+        let start = Instant::now();
+        let mut advantages: Vec<f32> = rows.iter().map(|&r| self.advantages[r]).collect();
+        if self.norm_adv {
+            normalize_advantages(&mut advantages);
+        }
+        self.gathered(start);
+        advantages
     }
 
     /// Returns the images of these `rows` after augmentation, with their skills from `inputs`; `None` without
@@ -141,6 +171,7 @@ impl Batch<'_> {
         Minibatch {
             augmented: self.augmented(&inputs, rows, device),
             inputs,
+            recall: None,
             left: (!rollout.left.is_empty()).then(|| vector(pick(&rollout.left), device)),
             logit_offsets: logit_offsets(&rollout.legal, rows, rollout.choices(), device),
             ppo: PpoBatch {

@@ -4,6 +4,7 @@ use crate::{
     Augmentation, LearnError, ObsKind, SettingError, TimeLimit,
     nn::CnnKind,
     norm::{RewardNormalizer, RewardReset},
+    policy::MemoryKind,
     settings,
     settings::{Range, Reader, Settings},
 };
@@ -14,6 +15,9 @@ const PPO: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO, Reader::SPIRL_PPO, Read
 
 /// Those of them whose policy is over actions.
 const OVER_ACTIONS: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO, Reader::SPIRL_PPO_DECODER, Reader::SPIRL_SAC_DECODER];
+
+/// Those of them whose policy can remember.
+const REMEMBER: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO];
 
 settings! {
     /// Hyperparameters of PPO. The defaults are those of the paper's CoinRun runs, with 64 environments in mind.
@@ -62,6 +66,9 @@ settings! {
     /// a copied decoder, whose observations are raw or, by `skills.norm_obs`, normalised by frozen statistics. Not
     /// for images, whose pixels are divided by 255.
     norm_obs: bool = false;
+    /// The memory of actor and critic. A policy that starts as a copy of the decoder has one that is without effect at
+    /// first. `sequence` ticks are trained together, and `burn_in` is explained with them.
+    memory: MemoryKind = MemoryKind::None, in Range::COUNT, by REMEMBER, such as "Gru(hidden: 128)", off "settings::is_off";
     /// Hidden layers of actor and critic. A copied decoder brings its own.
     hidden: Vec<usize> = vec![200, 200], in Range::COUNT;
     /// The function after each hidden layer.
@@ -101,11 +108,15 @@ impl PpoConfig {
         Ok(())
     }
 
-    /// Checks that the augmentations apply to such observations.
+    /// Checks that the augmentations and the memory apply to such observations.
     ///
     /// # Errors
-    /// [`LearnError::Setting`] names the first augmentation that does not apply.
+    /// [`LearnError::Setting`] names the first setting that does not apply.
     pub fn check_observation(&self, observation: &ObsKind) -> Result<(), LearnError> {
+        if let (MemoryKind::Stack { .. }, ObsKind::Image(_)) = (self.memory, observation) {
+            let text = "must not be a Stack for pictures: stack them with `image.stack`";
+            return Err(SettingError::new("ppo.memory", text).into());
+        }
         self.augment.iter().try_for_each(|augmentation| augmentation.check("ppo.augment", observation))
     }
 

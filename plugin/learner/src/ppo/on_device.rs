@@ -112,6 +112,7 @@ impl<'a> SentRollout<'a> {
         Minibatch {
             augmented: self.batch.augmented(&inputs, rows, &self.device),
             inputs,
+            recall: None,
             left: self.left.as_ref().map(column),
             logit_offsets: self.logit_offsets.as_ref().map(|offsets| offsets.clone().select(0, at.clone())),
             ppo: PpoBatch {

@@ -6,7 +6,7 @@ mod host_loss_tests;
 use crate::{
     Actions, LearnError,
     nn::{Adam, CategoricalRows, Dist, DistRows, GaussianRows, HostDist, NamedGrads, RowTerms, finite, host, scalar},
-    policy::NetInput,
+    policy::{NetInput, Recall},
     ppo::{
         PpoConfig, PpoNets, StepMetrics,
         objective::{PpoBatch, PpoLoss, ppo_loss},
@@ -47,6 +47,8 @@ pub struct Minibatch {
     pub inputs: NetInput,
     /// The same after augmentation; `None` without any.
     pub augmented: Option<NetInput>,
+    /// The sequences to which the rows belong, for a policy that remembers.
+    pub recall: Option<Recall>,
     /// Remaining share of each skill, `[n]`, if ticks are counted.
     pub left: Option<Tensor<1>>,
     /// Numbers that are added to the logits, `[n, choices]`, if some choices are illegal: see
@@ -171,7 +173,7 @@ pub(super) fn outputs(
     config: &PpoConfig,
     moment: &UpdateSettings<'_>,
 ) -> Result<(Dist, Tensor<1>), LearnError> {
-    let inputs = nets.actor.join(inputs)?;
+    let inputs = nets.actor.recall(nets.actor.join(inputs)?, batch.recall.as_ref())?;
     let dist = nets.actor.forward_legal(inputs.clone(), batch.logit_offsets.as_ref());
     let is_apart = moment.is_warming_up || !config.critic_trains_cnn;
     Ok((dist, nets.critic.forward(if is_apart { inputs.detach() } else { inputs }, batch.left.clone())))

@@ -109,7 +109,7 @@ impl SacLearner {
             Some(teacher) => {
                 let squashed = self.nets.actor.is_squashed();
                 let mut rng = base.streams.stream("score.own_samples", self.gradient_steps);
-                let states = StateBatch { z: &buffer.z, left: &[], obs: (&buffer.obs).into(), n };
+                let states = StateBatch { z: &buffer.z, left: &[], memory: &[], obs: (&buffer.obs).into(), n };
                 teacher.output(states, (&buffer.actions, &buffer.legal), squashed, &mut rng, base.device)?
             }
         };

@@ -243,7 +243,9 @@ fn actor_shape(config: &SacConfig, base: &LearnerBase) -> ActorShape {
     let (low, high) = config.log_std;
     match base.copied_teacher() {
         Some(teacher) => teacher.shape(),
-        None => ActorShape { net: actors_net(config, base), std: StdShape::Squashed(low, high), cnn: None },
+        None => {
+            ActorShape { net: actors_net(config, base), std: StdShape::Squashed(low, high), cnn: None, memory: None }
+        }
     }
 }
 

@@ -256,7 +256,12 @@ pub(super) fn explorer(space: ActionSpace, inputs: usize, device: &Device) -> Ac
             LogStd::Squashed { layer: zeros(), range: (middle - 1.0, middle + 1.0) }
         }
     };
-    Actor { cnn: None, net: Mlp { layers: Vec::new(), head: zeros(), activation: Activation::Relu }, log_std }
+    Actor {
+        cnn: None,
+        memory: None,
+        net: Mlp { layers: Vec::new(), head: zeros(), activation: Activation::Relu },
+        log_std,
+    }
 }
 
 // The losses of SAC, as pure functions of tensors, `[n]` per row.

@@ -314,7 +314,7 @@ mod tests {
         let mut numbers = |width: usize| -> Vec<f32> { (0..n * width).map(|_| normal(&mut rng)).collect() };
         let (z, obs) = (numbers(teacher.latent()), numbers(obs_dim));
         let actions = Actions::Discrete(vec![0; n]);
-        let states = StateBatch { z: &z, left: &[], obs: (&obs).into(), n };
+        let states = StateBatch { z: &z, left: &[], memory: &[], obs: (&obs).into(), n };
         let rows = teacher.output(states, (&actions, &[]), false, &mut Streams::new(1).stream("own", 0), device);
         let rows = rows.expect("finite").expect("there is a penalty");
         // The same row among others.

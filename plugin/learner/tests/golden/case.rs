@@ -30,6 +30,11 @@ impl Case {
         Self::read(&fixtures("sac_variants"), name)
     }
 
+    /// Creates the case of the script `tests/fixtures/memory/generate.py`, which no other folder has.
+    pub fn of_memory(name: &str) -> Self {
+        Self::read(&fixtures("memory"), name)
+    }
+
     fn read(folder: &Path, name: &str) -> Self {
         let read = |ending: &str| {
             let path = folder.join(format!("{name}.{ending}"));

@@ -2,8 +2,8 @@
 //! principles.
 //!
 //! The cases of PyTorch lie in `tests/fixtures/numerics`, or in the folder that the environment variable
-//! `PLAYBOT_GOLDEN` names; those of variants of SAC lie in `tests/fixtures/sac_variants`, beside the script that makes
-//! them.
+//! `PLAYBOT_GOLDEN` names; those of variants of SAC lie in `tests/fixtures/sac_variants`, that of memory in
+//! `tests/fixtures/memory`, beside the scripts that make them.
 
 #![allow(clippy::disallowed_methods, reason = "tests compare with the system's functions")]
 
@@ -15,6 +15,7 @@ mod generated;
 mod gru;
 mod impala;
 mod kl;
+mod memory;
 mod names;
 mod norm;
 mod ppo_loss;

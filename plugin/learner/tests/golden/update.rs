@@ -152,6 +152,7 @@ impl<'a> Update<'a> {
         Minibatch {
             inputs: inputs.into(),
             augmented: None,
+            recall: None,
             left: None,
             logit_offsets: None,
             ppo: PpoBatch {

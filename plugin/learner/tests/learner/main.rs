@@ -24,6 +24,7 @@ mod partial_demos;
 mod pixel_files;
 mod pixels;
 mod point;
+mod remembering;
 mod rlpd;
 mod sac;
 mod score;

@@ -206,6 +206,7 @@ fn minibatch(rows: usize) -> Minibatch {
     };
     Minibatch {
         augmented: None,
+        recall: None,
         left: None,
         logit_offsets: None,
         inputs: NetInput::Images {

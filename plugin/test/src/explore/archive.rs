@@ -15,6 +15,7 @@ use bevy_playbot::{
     episode::{Episode, EpisodeEnd, EpisodeResult},
     legal::{LegalActions, RedrawsIllegal},
     level::LevelQueue,
+    policy::AgentMemory,
     skill_prior::ActiveSkill,
     state_hash::StateHash,
     streams::AgentStreams,
@@ -376,7 +377,8 @@ impl Visit {
             if self.ticks as usize == path && agent.get::<Control>() != Some(&Control::Policy) {
                 let stream = |name| draws.streams.stream(name, self.job.number);
                 let [level, action, skill] = ["explore/level", "explore/action", "explore/skill"].map(stream);
-                agent.insert((Control::Policy, AgentStreams::restored(level, action, skill), ActiveSkill::default()));
+                let streams = AgentStreams::restored(level, action, skill);
+                agent.insert((Control::Policy, streams, ActiveSkill::default(), AgentMemory::default()));
             }
         } else {
             // Drawn once, even if the level takes several ticks to load.

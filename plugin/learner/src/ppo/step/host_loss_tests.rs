@@ -76,6 +76,7 @@ fn loss_metrics_and_gradient_are_those_of_the_tensors() {
         let values = vector(column(0.3), &device.clone().autodiff()).require_grad();
         let batch = Minibatch {
             augmented: None,
+            recall: None,
             left: None,
             logit_offsets: None,
             inputs: NetInput::Joined(matrix(vec![0.0], 1, 1, &device)),
@@ -140,6 +141,7 @@ fn penalised(
     let values = vector(values.clone(), &device.clone().autodiff()).require_grad();
     let batch = Minibatch {
         augmented: None,
+        recall: None,
         left: None,
         logit_offsets: offsets.cloned(),
         inputs: NetInput::Joined(matrix(vec![0.0], 1, 1, &device)),
@@ -201,6 +203,7 @@ fn actions_of_the_other_kind_are_refused() {
     let actions = ActionBatch::new(&Actions::Discrete(vec![0, 1]), &device);
     let batch = Minibatch {
         augmented: None,
+        recall: None,
         left: None,
         logit_offsets: None,
         inputs: NetInput::Joined(matrix(vec![0.0], 1, 1, &device)),
