@@ -58,6 +58,7 @@ impl SpirlLearner {
         device: DeviceKind,
     ) -> Result<Self, LearnError> {
         check(&config, score, ppo.time_limit)?;
+        ppo.refuse_curiosity("spirl")?;
         let below = PpoLearner::below(&config, &ppo, score, model, seed, device)?;
         let (gamma, ent_coef) = (ppo.gamma.powi(score.skill_interval as i32), 0.0);
         let ppo = PpoConfig { gamma, ent_coef, ..ppo };
@@ -129,7 +130,11 @@ impl PpoLearner {
         device: DeviceKind,
     ) -> Result<Option<Self>, LearnError> {
         let learner = || Self::with_skill(ppo.clone(), score.clone(), model, seed, device);
-        config.learn_decoder.then(learner).transpose()
+        if !config.learn_decoder {
+            return Ok(None);
+        }
+        ppo.refuse_curiosity("spirl")?;
+        learner().map(Some)
     }
 }
 

@@ -4,6 +4,7 @@ use crate::{
     Augmentation, LearnError, ObsKind, SettingError, TimeLimit,
     nn::CnnKind,
     norm::{RewardNormalizer, RewardReset},
+    ppo::curiosity::Curiosity,
     settings,
     settings::{Range, Reader, Settings},
 };
@@ -11,6 +12,9 @@ use playbot_kernels::elementwise::Activation;
 
 /// The algorithms that learn by PPO.
 const PPO: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO, Reader::SPIRL_PPO, Reader::SPIRL_SAC_DECODER];
+
+/// Those of them that may be curious.
+const CURIOUS: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO];
 
 /// Those of them whose policy is over actions.
 const OVER_ACTIONS: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO, Reader::SPIRL_PPO_DECODER, Reader::SPIRL_SAC_DECODER];
@@ -86,6 +90,14 @@ settings! {
     /// True if the critic's loss trains the convolutions over images too, instead of only reading the policy's
     /// features. It never does while the critic warms up.
     critic_trains_cnn: bool = true;
+    /// A reward for what is new, with a value of its own: `Off`, or `Rnd` for random network distillation (Burda et al.
+    /// 2018, "Exploration by random network distillation"). `extrinsic` and `intrinsic` weigh the advantages of both
+    /// rewards. `gamma` discounts the intrinsic one, whose return goes on over the ends of episodes. `share` of the
+    /// samples train the predictor, with the rate `lr`. `hidden` and `features` are its sizes.
+    curiosity: Curiosity = Curiosity::Off,
+        within "`extrinsic`, `intrinsic` 0 to 1000000; `gamma` at least 0 and below 1; `share` above 0, at most 1; `lr` \
+        above 0; sizes at least 1", by CURIOUS,
+        such as "Rnd(extrinsic: 2.0, intrinsic: 1.0, gamma: 0.99, share: 0.25)", off "crate::settings::is_off";
 }
 
 impl PpoConfig {
@@ -95,6 +107,7 @@ impl PpoConfig {
     /// [`LearnError::Setting`] names the first impossible setting.
     pub fn validate(&self) -> Result<(), LearnError> {
         self.check_ranges()?;
+        self.curiosity.check()?;
         if self.anneal_lr && self.total_updates.is_none_or(|n| n == 0) {
             return Err(SettingError::new("ppo.anneal_lr", "needs `ppo.total_updates`").into());
         }
@@ -107,6 +120,20 @@ impl PpoConfig {
     /// [`LearnError::Setting`] names the first augmentation that does not apply.
     pub fn check_observation(&self, observation: &ObsKind) -> Result<(), LearnError> {
         self.augment.iter().try_for_each(|augmentation| augmentation.check("ppo.augment", observation))
+    }
+
+    /// Checks that no intrinsic reward is wanted, for a learner that has none.
+    ///
+    /// # Errors
+    /// [`LearnError::Setting`] if one is.
+    pub(crate) fn refuse_curiosity(&self, learner: &str) -> Result<(), LearnError> {
+        match self.curiosity {
+            Curiosity::Off => Ok(()),
+            Curiosity::Rnd { .. } => {
+                let why = format!("is for ppo and score-ppo, not for {learner}: leave it `Off`");
+                Err(SettingError::new("ppo.curiosity", why).into())
+            }
+        }
     }
 
     /// Returns the normaliser of rewards that these settings describe.
