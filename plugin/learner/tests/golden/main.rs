@@ -2,13 +2,14 @@
 //! principles.
 //!
 //! The cases of PyTorch lie in `tests/fixtures/numerics`, or in the folder that the environment variable
-//! `PLAYBOT_GOLDEN` names; those of variants of SAC lie in `tests/fixtures/sac_variants`, beside the script that makes
-//! them.
+//! `PLAYBOT_GOLDEN` names; those of variants of SAC and of curiosity lie in `tests/fixtures/sac_variants` and
+//! `tests/fixtures/curiosity`, beside the scripts that make them.
 
 #![allow(clippy::disallowed_methods, reason = "tests compare with the system's functions")]
 
 mod adam;
 mod case;
+mod curiosity;
 mod fixed;
 mod gae;
 mod generated;
