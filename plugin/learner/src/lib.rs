@@ -71,7 +71,7 @@ pub use crate::{
     observation::{Augmentation, ImageShape, ObsKind, ObsSlice, Observations, PictureMetadata},
     policy::{MemoryKind, Policy, PolicyOutput, StdKind},
     policy_file::{PolicyFile, PolicyMetadata},
-    ppo::{PpoConfig, PpoLearner, UpdateMetrics},
+    ppo::{Curiosity, PpoConfig, PpoLearner, UpdateMetrics},
     rng::{RngState, Streams},
     rollout::{EndStates, ObsColumns, Rollout, RolloutStep},
     sac::{EntropyCoef, RlpdConfig, SacConfig, SacLearner, SacMetrics},

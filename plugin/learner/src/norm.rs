@@ -330,13 +330,15 @@ pub(crate) fn take_obs_stats(file: &mut TensorFile, name: &str, dim: usize) -> R
     }
 }
 
-fn put_stats(file: &mut TensorFile, name: &str, stats: &RunningStats) {
+/// Adds running statistics called `name` to a file.
+pub(crate) fn put_stats(file: &mut TensorFile, name: &str, stats: &RunningStats) {
     file.put_f64(&format!("{name}.mean"), &stats.mean);
     file.put_f64(&format!("{name}.var"), &stats.var);
     file.put_f64(&format!("{name}.count"), &[stats.count]);
 }
 
-fn take_stats(file: &mut TensorFile, name: &str, stats: &mut RunningStats) -> Result<(), FileError> {
+/// Takes the running statistics called `name` out of a file.
+pub(crate) fn take_stats(file: &mut TensorFile, name: &str, stats: &mut RunningStats) -> Result<(), FileError> {
     let dim = stats.dim();
     stats.mean = file.take_f64(&format!("{name}.mean"), Some(dim))?;
     stats.var = file.take_f64(&format!("{name}.var"), Some(dim))?;

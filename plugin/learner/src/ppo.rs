@@ -9,12 +9,14 @@
 //!   of tensors.
 //! - `schedule`: the learning rate and the penalty's weight of each update.
 //! - `step`: one gradient step: minibatch → loss → gradient → Adam.
+//! - `curiosity`: an intrinsic reward, and all that it needs.
 //! - `on_device`: an update on a graphics card: the rollout is sent once, and the numbers of all steps are read back
 //!   together.
 //! - `metrics`: metrics of a gradient step and of an update.
 
 mod batch;
 mod config;
+mod curiosity;
 mod metrics;
 mod objective;
 mod on_device;
@@ -27,10 +29,11 @@ use crate::{
     device::{guarded, update_on},
     file::{FileKind, TensorFile},
     learner::{Checkpoint, ContinuedSchedule, Learner, LearnerBase, LearnerMetrics},
-    nn::{Adam, AdamConfig, ParamVisitor, Parameters, RandomInit, path, tracked},
+    nn::{Adam, AdamConfig, Linear, ParamVisitor, Parameters, RandomInit, path, tracked},
     policy::{Actor, ActorShape, Critic, Memory, NetShape, Policy, StateBatch, StdShape},
     ppo::{
         batch::{Batch, JoinedRows, minibatches},
+        curiosity::{INTRINSIC, Judged, Rnd, endless_critic, intrinsic_head},
         metrics::Has,
         on_device::{Reports, SentRollout, images_at_a_time},
         schedule::{Schedule, TakenUp},
@@ -47,8 +50,9 @@ use std::{cell::Cell, path::Path, time::Instant};
 
 pub use crate::ppo::{
     config::PpoConfig,
+    curiosity::{Curiosity, Predictor, RndNet, combined_advantages, endless_gae, prediction_errors},
     metrics::{RatioStats, StepMetrics, UpdateMetrics, explained_variance, ratio_stats},
-    objective::{Advantages, PpoBatch, PpoLoss, gae, normalize_advantages, ppo_loss},
+    objective::{Advantages, PpoBatch, PpoLoss, gae, intrinsic_value_loss, normalize_advantages, ppo_loss},
     step::{Minibatch, gradient_step},
 };
 
@@ -64,6 +68,8 @@ pub struct PpoLearner {
     pub(crate) base: LearnerBase,
     pub(crate) nets: PpoNets,
     adam: Adam,
+    /// Rewards what is new; `None` without curiosity.
+    curiosity: Option<Rnd>,
     taken_up: Option<TakenUp>,
     /// True if it began with the weights of another run, and so is no copy of the decoder.
     is_continuation: bool,
@@ -103,7 +109,8 @@ impl PpoLearner {
     ) -> Result<Self, LearnError> {
         let base = Self::new_base(&config, spec, teacher, seed, device)?;
         let nets = guarded(&base.device.plain(), || PpoNets::fresh(&config, &base))?;
-        Ok(Self::with_nets(config, base, &nets))
+        let curiosity = Rnd::fresh(&config, &base)?;
+        Ok(Self::with_nets(config, base, &nets, curiosity))
     }
 
     fn new_base(
@@ -123,10 +130,10 @@ impl PpoLearner {
         LearnerBase::new(spec, teacher, rewards, config.norm_obs, seed, device)
     }
 
-    fn with_nets(config: PpoConfig, base: LearnerBase, nets: &PpoNets) -> Self {
+    fn with_nets(config: PpoConfig, base: LearnerBase, nets: &PpoNets, curiosity: Option<Rnd>) -> Self {
         let PpoConfig { adam_eps: eps, weight_decay, .. } = config;
         let adam = Adam::new(AdamConfig { eps, weight_decay, ..AdamConfig::default() });
-        Self { config, base, nets: tracked(nets), adam, taken_up: None, is_continuation: false }
+        Self { config, base, nets: tracked(nets), adam, curiosity, taken_up: None, is_continuation: false }
     }
 
     /// Returns the settings.
@@ -154,7 +161,8 @@ impl PpoLearner {
         let base = Self::new_base(&saved.config, saved.spec, saved.teacher.take(), saved.seed, device);
         let base = base.map_err(|e| saved.file.learner(e))?;
         let nets = PpoNets::stored(&saved.config, &base, &mut saved.file)?;
-        let mut learner = Self::with_nets(saved.config.clone(), base, &nets);
+        let curiosity = Rnd::stored(&saved.config, &base, &mut saved.file, saved.counters.predictor_steps)?;
+        let mut learner = Self::with_nets(saved.config.clone(), base, &nets, curiosity);
         saved.file.take_adam(&mut learner.adam, "", &mut learner.nets, saved.counters.adam_steps)?;
         (learner.taken_up, learner.is_continuation) = (saved.counters.taken_up, saved.counters.is_continuation);
         saved.finish(&mut learner.base)?;
@@ -164,11 +172,12 @@ impl PpoLearner {
     /// Returns the file that [`Learner::save`] writes.
     pub(crate) fn checkpoint(&self, path: &Path) -> Result<TensorFile, FileError> {
         let Self { taken_up, is_continuation, .. } = *self;
-        let counters = Counters { adam_steps: self.adam.steps, taken_up, is_continuation };
+        let predictor_steps = self.curiosity.as_ref().map_or(0, Rnd::steps);
+        let counters = Counters { adam_steps: self.adam.steps, predictor_steps, taken_up, is_continuation };
         self.base.checkpoint(path, FILE, &self.config, &counters, |file| {
             file.put_network("", &self.nets)?;
             file.put_adam(&self.adam)?;
-            Ok(())
+            self.curiosity.as_ref().map_or(Ok(()), |curiosity| curiosity.put(file))
         })
     }
 }
@@ -237,16 +246,24 @@ impl PpoLearner {
             None => rollout.rewards.clone(),
         };
         let config = &self.config;
-        let estimate = gae(rollout, &rewards, config.gamma, config.lambda, config.time_limit);
+        let mut estimate = gae(rollout, &rewards, config.gamma, config.lambda, config.time_limit);
         let explained_variance = explained_variance(&rollout.values, &estimate.returns);
         let latent = self.base.spec.latent;
         let teacher = self.teacher_output(rollout)?;
         let start = Instant::now();
+        let (mut intrinsic_returns, mut curious) = (Vec::new(), None);
+        if let (Some(curiosity), Some(head)) = (&mut self.curiosity, &self.nets.intrinsic) {
+            let critic = self.base.snapshot(&self.nets.actor, Some(&endless_critic(&self.nets.critic, head)));
+            let judged = curiosity.update(rollout, &estimate.advantages, &critic, config, &self.base)?;
+            let Judged { advantages, returns, reward, predictor_loss } = judged;
+            (estimate.advantages, intrinsic_returns, curious) = (advantages, returns, Some((reward, predictor_loss)));
+        }
         let joined = JoinedRows::of(rollout, latent, self.base.obs_stats().as_deref());
         let batch = Batch {
             rollout,
             advantages: estimate.advantages,
             returns: estimate.returns,
+            intrinsic_returns,
             teacher,
             latent,
             joined,
@@ -278,7 +295,8 @@ impl PpoLearner {
         if let (Some(normalizer), Observations::Vector(values)) = (&mut self.base.observations, &rollout.obs) {
             normalizer.update(values);
         }
-        let has = Has { penalty: batch.teacher.is_some(), augmentation: !self.config.augment.is_empty() };
+        let has =
+            Has { penalty: batch.teacher.is_some(), augmentation: !self.config.augment.is_empty(), curiosity: curious };
         Ok(UpdateMetrics::mean(&sum, steps, has, explained_variance, lr))
     }
 
@@ -296,11 +314,20 @@ impl PpoLearner {
             ("other hidden layers or convolutions", shape(self) != shape(&other) || critic(self) != critic(&other)),
             ("another `score.critic_clock`", counts(self) != counts(&other)),
             ("another `ppo.norm_obs`", norm_obs(self) != norm_obs(&other)),
+            ("other networks of `ppo.curiosity`", !self.config.curiosity.predicts_like(&other.config.curiosity)),
         ];
         if let Some((what, _)) = differences.into_iter().find(|(_, differs)| *differs) {
             return Err(LearnError::Config(format!("it has {what} than the new run: give both the same")));
         }
-        self.nets = tracked(&other.nets);
+        // Curiosity that the other run did not have begins anew.
+        let intrinsic = match &self.nets.intrinsic {
+            Some(own) => Some(other.nets.intrinsic.clone().unwrap_or_else(|| own.clone())),
+            None => None,
+        };
+        self.nets = tracked(&PpoNets { intrinsic, ..other.nets });
+        if let (Some(own), Some(theirs)) = (&mut self.curiosity, other.curiosity) {
+            own.take_over(theirs);
+        }
         self.base.observations = other.base.observations;
         if let (Some(own), Some(theirs)) = (&mut self.base.rewards, other.base.rewards) {
             own.stats = theirs.stats;
@@ -393,6 +420,9 @@ impl PpoLearner {
 #[derive(Serialize, Deserialize, Debug)]
 struct Counters {
     adam_steps: u64,
+    /// Gradient steps of the predictor, only in runs with curiosity.
+    #[serde(default, skip_serializing_if = "crate::settings::is_off")]
+    predictor_steps: u64,
     /// Only in runs that got another length.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     taken_up: Option<TakenUp>,
@@ -403,7 +433,7 @@ struct Counters {
 
 // Actor and critic as one set of parameters.
 
-/// The networks of PPO: the parameters `actor.*` and `critic.*`, whose gradients are clipped together. The trunk of
+/// The networks of PPO: the parameters `actor.*`, `critic.*` and `intrinsic.*`, whose gradients are clipped together. The trunk of
 /// images, `actor.cnn.*`, is the critic's too.
 #[derive(Clone, Debug)]
 pub struct PpoNets {
@@ -411,6 +441,8 @@ pub struct PpoNets {
     pub actor: Actor,
     /// The value function.
     pub critic: Critic,
+    /// The critic's second head, for intrinsic rewards; `None` without curiosity.
+    pub intrinsic: Option<Linear>,
 }
 
 impl PpoNets {
@@ -438,7 +470,9 @@ impl PpoNets {
         let counts = base.score_config().is_some_and(|score| score.critic_clock);
         let Ok(critic) =
             if counts { critic.with_clock(&mut RandomInit { rng: &mut rng, device: &device }, "") } else { Ok(critic) };
-        Ok(Self { actor, critic })
+        let mut rng = base.streams.stream("ppo.intrinsic", 0);
+        let Ok(intrinsic) = intrinsic_head(config, &critic, &mut RandomInit { rng: &mut rng, device: &device });
+        Ok(Self { actor, critic, intrinsic })
     }
 
     /// Reads the networks of a checkpoint.
@@ -448,7 +482,9 @@ impl PpoNets {
     fn stored(config: &PpoConfig, base: &LearnerBase, file: &mut TensorFile) -> Result<Self, FileError> {
         let (shape, device) = (actor_shape(config, base), base.device.plain());
         let actor = shape.stored(&base.spec, file, "actor", &device)?;
-        Ok(Self { actor, critic: critic_shape(config, &shape).stored_critic(file, "critic", &device)? })
+        let critic = critic_shape(config, &shape).stored_critic(file, "critic", &device)?;
+        let intrinsic = intrinsic_head(config, &critic, &mut file.params(&device))?;
+        Ok(Self { actor, critic, intrinsic })
     }
 }
 
@@ -470,5 +506,8 @@ impl Parameters for PpoNets {
     fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
         self.actor.visit(&path(prefix, "actor"), visitor);
         self.critic.visit(&path(prefix, "critic"), visitor);
+        if let Some(intrinsic) = &mut self.intrinsic {
+            intrinsic.visit(&path(prefix, INTRINSIC), visitor);
+        }
     }
 }

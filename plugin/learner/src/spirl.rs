@@ -14,10 +14,10 @@ mod over_skills;
 mod skill_steps;
 
 use crate::{
-    DeviceKind, FileError, LearnError, ObsSlice, PolicySpec, PpoLearner, Rollout, SacLearner, SettingError, TimeLimit,
+    DeviceKind, FileError, LearnError, ObsSlice, PolicySpec, PpoLearner, Rollout, SacLearner, TimeLimit,
     file::{FileKind, TensorFile},
     learner::{ContinuedSchedule, LearnTimes, Learner, LearnerBase, LearnerMetrics},
-    policy::{MemoryKind, Policy},
+    policy::Policy,
     ppo::PpoConfig,
     sac::{EntropyCoef, SacConfig},
     score::{PriorKind, ScoreConfig, Teacher, TiedTo},
@@ -58,7 +58,7 @@ impl SpirlLearner {
         device: DeviceKind,
     ) -> Result<Self, LearnError> {
         check(&config, score, ppo.time_limit)?;
-        check_memory(&ppo)?;
+        ppo.refuse_memory_and_curiosity("spirl")?;
         let below = PpoLearner::below(&config, &ppo, score, model, seed, device)?;
         let (gamma, ent_coef) = (ppo.gamma.powi(score.skill_interval as i32), 0.0);
         let ppo = PpoConfig { gamma, ent_coef, ..ppo };
@@ -83,7 +83,6 @@ impl SpirlLearner {
         device: DeviceKind,
     ) -> Result<Self, LearnError> {
         check(&config, score, sac.time_limit)?;
-        check_memory(ppo)?;
         if !model.config().tanh_latent {
             return Err(LearnError::Config(
                 "spirl by SAC squashes skills: it needs a skill model with tanh_latent".to_owned(),
@@ -131,15 +130,11 @@ impl PpoLearner {
         device: DeviceKind,
     ) -> Result<Option<Self>, LearnError> {
         let learner = || Self::with_skill(ppo.clone(), score.clone(), model, seed, device);
-        config.learn_decoder.then(learner).transpose()
-    }
-}
-
-/// Checks that no memory is asked for: a policy over skills has none.
-fn check_memory(ppo: &PpoConfig) -> Result<(), LearnError> {
-    match ppo.memory {
-        MemoryKind::None => Ok(()),
-        _ => Err(SettingError::new("ppo.memory", "must be None for spirl, whose policy acts once per skill").into()),
+        if !config.learn_decoder {
+            return Ok(None);
+        }
+        ppo.refuse_memory_and_curiosity("spirl")?;
+        learner().map(Some)
     }
 }
 

@@ -56,6 +56,7 @@ pub fn ppo(criterion: &mut Criterion) {
     let mut nets = tracked(&PpoNets {
         actor: Actor::new(&shape, ActionSpace::Discrete(CHOICES), StdKind::Vector, &mut rng, &device),
         critic: Critic::new(&shape, &mut rng, &device),
+        intrinsic: None,
     });
     let inputs = TensorData::new(tiles(rows * obs_dim, &mut rng), [rows, obs_dim]);
     let actions = Actions::Discrete(choices(rows, &mut rng));
@@ -74,6 +75,7 @@ pub fn ppo(criterion: &mut Criterion) {
             returns: column(),
         },
         teacher: None,
+        intrinsic_returns: None,
     };
     let (config, mut adam) = (PpoConfig::default(), Adam::new(AdamConfig::default()));
     criterion.bench_function("step/ppo-563-200-200-15/2048", |bencher| {

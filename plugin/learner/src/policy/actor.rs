@@ -286,7 +286,11 @@ impl Critic {
     /// Returns the values of joined inputs `[z, s]`: `[n, latent + obs_dim]` to `[n]`. `left`, `[n]`, is the
     /// remaining share of each skill's ticks; without it all skills count as newly drawn.
     pub fn forward(&self, x: Tensor<2>, left: Option<Tensor<1>>) -> Tensor<1> {
-        let features = self.net.features(x);
+        self.values_of(self.net.features(x), left)
+    }
+
+    /// Returns the values of [`Self::forward`] from the activations of the last hidden layer.
+    pub(crate) fn values_of(&self, features: Tensor<2>, left: Option<Tensor<1>>) -> Tensor<1> {
         let values = self.net.head.number(features.clone());
         match (&self.clock, left) {
             (Some(clock), Some(left)) => values + clock.number(features) * left,

@@ -28,6 +28,8 @@ pub(super) struct Batch<'a> {
     pub(super) rollout: &'a Rollout,
     pub(super) advantages: Vec<f32>,
     pub(super) returns: Vec<f32>,
+    /// Returns of intrinsic rewards; empty without curiosity.
+    pub(super) intrinsic_returns: Vec<f32>,
     pub(super) teacher: Option<TeacherOutput>,
     /// Number of the rollout's skill values that the networks read: all or 0.
     pub(super) latent: usize,
@@ -182,6 +184,8 @@ impl Batch<'_> {
                 returns: vector(pick(&self.returns), device),
             },
             teacher: self.teacher.as_ref().map(|teacher| teacher.batch(rows, device)),
+            intrinsic_returns: (!self.intrinsic_returns.is_empty())
+                .then(|| vector(pick(&self.intrinsic_returns), device)),
         }
     }
 }

@@ -5,6 +5,7 @@ use crate::{
     nn::CnnKind,
     norm::{RewardNormalizer, RewardReset},
     policy::MemoryKind,
+    ppo::curiosity::Curiosity,
     settings,
     settings::{Range, Reader, Settings},
 };
@@ -12,6 +13,9 @@ use playbot_kernels::elementwise::Activation;
 
 /// The algorithms that learn by PPO.
 const PPO: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO, Reader::SPIRL_PPO, Reader::SPIRL_SAC_DECODER];
+
+/// Those of them that may be curious.
+const CURIOUS: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO];
 
 /// Those of them whose policy is over actions.
 const OVER_ACTIONS: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO, Reader::SPIRL_PPO_DECODER, Reader::SPIRL_SAC_DECODER];
@@ -93,6 +97,14 @@ settings! {
     /// True if the critic's loss trains the convolutions over images too, instead of only reading the policy's
     /// features. It never does while the critic warms up.
     critic_trains_cnn: bool = true;
+    /// A reward for what is new, with a value of its own: `Off`, or `Rnd` for random network distillation (Burda et al.
+    /// 2018, "Exploration by random network distillation"). `extrinsic` and `intrinsic` weigh the advantages of both
+    /// rewards. `gamma` discounts the intrinsic one, whose return goes on over the ends of episodes. `share` of the
+    /// samples train the predictor, with the rate `lr`. `hidden` and `features` are its sizes.
+    curiosity: Curiosity = Curiosity::Off,
+        within "`extrinsic`, `intrinsic` 0 to 1000000; `gamma` at least 0 and below 1; `share` above 0, at most 1; `lr` \
+        above 0; sizes at least 1", by CURIOUS,
+        such as "Rnd(extrinsic: 2.0, intrinsic: 1.0, gamma: 0.99, share: 0.25)", off "crate::settings::is_off";
 }
 
 impl PpoConfig {
@@ -102,6 +114,7 @@ impl PpoConfig {
     /// [`LearnError::Setting`] names the first impossible setting.
     pub fn validate(&self) -> Result<(), LearnError> {
         self.check_ranges()?;
+        self.curiosity.check()?;
         if self.anneal_lr && self.total_updates.is_none_or(|n| n == 0) {
             return Err(SettingError::new("ppo.anneal_lr", "needs `ppo.total_updates`").into());
         }
@@ -118,6 +131,24 @@ impl PpoConfig {
             return Err(SettingError::new("ppo.memory", text).into());
         }
         self.augment.iter().try_for_each(|augmentation| augmentation.check("ppo.augment", observation))
+    }
+
+    /// Checks that neither memory nor an intrinsic reward is wanted, for a learner that has neither.
+    ///
+    /// # Errors
+    /// [`LearnError::Setting`] names the one that is.
+    pub(crate) fn refuse_memory_and_curiosity(&self, learner: &str) -> Result<(), LearnError> {
+        let wanted = [
+            ("ppo.memory", "None", self.memory != MemoryKind::None),
+            ("ppo.curiosity", "Off", self.curiosity != Curiosity::Off),
+        ];
+        match wanted.into_iter().find(|(.., is_wanted)| *is_wanted) {
+            None => Ok(()),
+            Some((path, off, _)) => {
+                let why = format!("is for ppo and score-ppo, not for {learner}: leave it `{off}`");
+                Err(SettingError::new(path, why).into())
+            }
+        }
     }
 
     /// Returns the normaliser of rewards that these settings describe.

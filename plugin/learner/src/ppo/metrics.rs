@@ -27,6 +27,16 @@ pub struct UpdateMetrics {
     /// Sensitivity of actor and critic to augmentations, not weighted; `None` without any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub augmentation_loss: Option<f32>,
+    /// Value loss of intrinsic rewards, with its ½ and without its weight; `None` without curiosity.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub intrinsic_value_loss: Option<f32>,
+    /// Mean intrinsic reward of a step, divided by the running deviation of the discounted return; `None` without
+    /// curiosity.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub intrinsic_reward: Option<f32>,
+    /// Mean squared error of the predictor on what it learned from, before each of its steps; `None` without curiosity.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub predictor_loss: Option<f32>,
     /// Norm of the gradient before clipping.
     pub grad_norm: f32,
     /// The learning rate used.
@@ -38,6 +48,8 @@ pub struct UpdateMetrics {
 pub(super) struct Has {
     pub(super) penalty: bool,
     pub(super) augmentation: bool,
+    /// Mean intrinsic reward, and mean loss of the predictor.
+    pub(super) curiosity: Option<(f64, f64)>,
 }
 
 impl UpdateMetrics {
@@ -54,6 +66,9 @@ impl UpdateMetrics {
             decoder_kl: has.penalty.then_some(mean.decoder_kl),
             confidence: has.penalty.then_some(mean.confidence),
             augmentation_loss: has.augmentation.then_some(mean.augmentation_loss),
+            intrinsic_value_loss: has.curiosity.map(|_| mean.intrinsic_value_loss),
+            intrinsic_reward: has.curiosity.map(|(reward, _)| reward as f32),
+            predictor_loss: has.curiosity.map(|(_, loss)| loss as f32),
             grad_norm: mean.grad_norm,
             lr: lr as f32,
         }
@@ -70,9 +85,12 @@ impl UpdateMetrics {
             ("losses/clip_fraction", Some(self.clip_fraction)),
             ("losses/explained_variance", Some(self.explained_variance)),
             ("losses/augmentation_loss", self.augmentation_loss),
+            ("losses/intrinsic_value_loss", self.intrinsic_value_loss),
             ("losses/grad_norm", Some(self.grad_norm)),
             ("score/decoder_kl", self.decoder_kl),
             ("score/alpha_mean", self.confidence),
+            ("curiosity/intrinsic_reward", self.intrinsic_reward),
+            ("curiosity/predictor_loss", self.predictor_loss),
         ];
         all.into_iter().filter_map(|(tag, value)| Some((tag, f64::from(value?)))).collect()
     }
@@ -144,6 +162,8 @@ step_metrics! {
         confidence,
         /// Divergence of actor and critic on augmented images, not weighted.
         augmentation_loss,
+        /// Value loss of intrinsic rewards, without its weight.
+        intrinsic_value_loss,
         /// Norm of the gradient before clipping.
         grad_norm,
     }

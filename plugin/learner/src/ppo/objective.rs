@@ -111,6 +111,11 @@ pub fn ppo_loss(
     Ok(PpoLoss { policy_loss, value_loss, entropy: dist.entropy().mean(), log_ratio })
 }
 
+/// Returns ½ mean((V - R)²) of the critic's second head, `[1]`, for values and returns of `[n]`.
+pub fn intrinsic_value_loss(values: Tensor<1>, returns: Tensor<1>) -> Tensor<1> {
+    (values - returns).square().mean() * 0.5
+}
+
 /// Normalises advantages: (A - mean) / (deviation + 1e-8) with the unbiased deviation. A single advantage becomes 0.
 pub fn normalize_advantages(advantages: &mut [f32]) {
     let n = advantages.len() as f64;

@@ -13,8 +13,8 @@ use crate::{
     ppo::{
         PpoConfig, PpoNets, StepMetrics,
         batch::Batch,
-        objective::{PpoBatch, PpoLoss},
-        step::{Losses, Minibatch, UpdateSettings, augmentation_loss, outputs},
+        objective::{PpoBatch, PpoLoss, intrinsic_value_loss},
+        step::{Losses, Minibatch, Outputs, UpdateSettings, augmentation_loss, outputs},
     },
     score::TeacherBatch,
 };
@@ -36,6 +36,7 @@ pub(super) struct SentRollout<'a> {
     logit_offsets: Option<Tensor<2>>,
     ppo: PpoBatch,
     teacher: Option<(Dist, Tensor<1>)>,
+    intrinsic_returns: Option<Tensor<1>>,
     device: Device,
 }
 
@@ -74,6 +75,7 @@ impl<'a> SentRollout<'a> {
                 returns: column(&batch.returns),
             },
             teacher: batch.teacher.as_ref().map(|t| (t.dist.rows(&all, device), column(&t.confidence))),
+            intrinsic_returns: (!batch.intrinsic_returns.is_empty()).then(|| column(&batch.intrinsic_returns)),
             batch,
             device: device.clone(),
         }
@@ -132,6 +134,7 @@ impl<'a> SentRollout<'a> {
                     mean_confidence: host.mean_confidence(rows),
                 }
             }),
+            intrinsic_returns: self.intrinsic_returns.as_ref().map(column),
         }
     }
 }
@@ -281,7 +284,7 @@ fn metrics_and_loss(
     moment: &UpdateSettings<'_>,
 ) -> Result<(StepMetrics<Metric>, Tensor<1>), LearnError> {
     use Metric::{Known, OnDevice};
-    let (dist, values) = outputs(nets, &batch.inputs, batch, config, moment)?;
+    let Outputs { dist, values, intrinsic } = outputs(nets, &batch.inputs, batch, config, moment)?;
     let augmentation = augmentation_loss(nets, &dist, &values, batch, config, moment)?;
     let Losses { ppo, penalty, mut total } = Losses::of(&dist, values, batch, config, moment)?;
     let PpoLoss { policy_loss, value_loss, entropy, log_ratio } = ppo;
@@ -301,6 +304,14 @@ fn metrics_and_loss(
         }
         None => Known(0.0),
     };
+    let intrinsic_value_loss = match intrinsic.zip(batch.intrinsic_returns.clone()) {
+        Some((values, returns)) => {
+            let loss = intrinsic_value_loss(values, returns);
+            total = total + loss.clone() * config.vf_coef;
+            OnDevice(loss.inner())
+        }
+        None => Known(0.0),
+    };
     let metrics = StepMetrics {
         policy_loss: OnDevice(policy_loss),
         value_loss: OnDevice(value_loss),
@@ -312,6 +323,7 @@ fn metrics_and_loss(
         clip_fraction: OnDevice(clip_fraction),
         confidence: Known(0.0),
         augmentation_loss,
+        intrinsic_value_loss,
         grad_norm: Known(0.0),
     };
     Ok((metrics, total))

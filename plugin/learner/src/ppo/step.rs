@@ -9,7 +9,7 @@ use crate::{
     policy::{NetInput, Recall},
     ppo::{
         PpoConfig, PpoNets, StepMetrics,
-        objective::{PpoBatch, PpoLoss, ppo_loss},
+        objective::{PpoBatch, PpoLoss, intrinsic_value_loss, ppo_loss},
         ratio_stats,
     },
     score::{KlDirection, Penalty, PenaltyForm, ScoreConfig, TeacherBatch, penalty},
@@ -58,6 +58,8 @@ pub struct Minibatch {
     pub ppo: PpoBatch,
     /// Constants of the penalty, if there is one.
     pub teacher: Option<TeacherBatch>,
+    /// Returns of intrinsic rewards, `[n]`; `None` without curiosity.
+    pub intrinsic_returns: Option<Tensor<1>>,
 }
 
 /// The terms of a minibatch's loss.
@@ -148,9 +150,9 @@ fn loss(
     moment: &UpdateSettings<'_>,
     steps: u64,
 ) -> Result<(Tensor<1>, StepMetrics), LearnError> {
-    let (dist, values) = outputs(nets, &batch.inputs, batch, config, moment)?;
+    let Outputs { dist, values, intrinsic } = outputs(nets, &batch.inputs, batch, config, moment)?;
     let augmentation = augmentation_loss(nets, &dist, &values, batch, config, moment)?;
-    let (total, metrics) = if is_host(&values.device()) && moment.has_mean_loss() {
+    let (mut total, mut metrics) = if is_host(&values.device()) && moment.has_mean_loss() {
         let loss = HostLoss::of(&dist, &values, batch, config, moment, steps)?;
         let metrics = loss.metrics;
         (loss.tensor(&dist, values), metrics)
@@ -159,10 +161,24 @@ fn loss(
         let metrics = losses.metrics(batch, config, steps)?;
         (losses.total, metrics)
     };
+    if let Some((values, returns)) = intrinsic.zip(batch.intrinsic_returns.clone()) {
+        let of_intrinsic = intrinsic_value_loss(values, returns);
+        metrics.intrinsic_value_loss = finite("intrinsic_value_loss", &of_intrinsic, steps)?;
+        metrics.total_loss += config.vf_coef * metrics.intrinsic_value_loss;
+        total = total + of_intrinsic * config.vf_coef;
+    }
     let Some(augmentation) = augmentation else { return Ok((total, metrics)) };
     let augmentation_loss = finite("augmentation_loss", &augmentation, steps)?;
     let total_loss = metrics.total_loss + config.augment_coef * augmentation_loss;
     Ok((total + augmentation * config.augment_coef, StepMetrics { augmentation_loss, total_loss, ..metrics }))
+}
+
+/// The outputs of actor and critic.
+pub(super) struct Outputs {
+    pub(super) dist: Dist,
+    pub(super) values: Tensor<1>,
+    /// Values of intrinsic rewards, if the critic has a head for them.
+    pub(super) intrinsic: Option<Tensor<1>>,
 }
 
 /// Returns the outputs of actor and critic for `inputs`: those of `batch`, or augmented ones.
@@ -172,11 +188,13 @@ pub(super) fn outputs(
     batch: &Minibatch,
     config: &PpoConfig,
     moment: &UpdateSettings<'_>,
-) -> Result<(Dist, Tensor<1>), LearnError> {
+) -> Result<Outputs, LearnError> {
     let inputs = nets.actor.recall(nets.actor.join(inputs)?, batch.recall.as_ref())?;
     let dist = nets.actor.forward_legal(inputs.clone(), batch.logit_offsets.as_ref());
     let is_apart = moment.is_warming_up || !config.critic_trains_cnn;
-    Ok((dist, nets.critic.forward(if is_apart { inputs.detach() } else { inputs }, batch.left.clone())))
+    let features = nets.critic.net.features(if is_apart { inputs.detach() } else { inputs });
+    let intrinsic = nets.intrinsic.as_ref().map(|head| head.number(features.clone()));
+    Ok(Outputs { dist, values: nets.critic.values_of(features, batch.left.clone()), intrinsic })
 }
 
 /// Does [`gradient_step`] on a minibatch that comes in parts, each with its share of the rows.
@@ -220,9 +238,9 @@ pub(super) fn augmentation_loss(
 ) -> Result<Option<Tensor<1>>, LearnError> {
     // While only the critic learns the actor must not change.
     let Some(changed) = batch.augmented.as_ref().filter(|_| !moment.is_warming_up) else { return Ok(None) };
-    let (dist_of_changed, values_of_changed) = outputs(nets, changed, batch, config, moment)?;
-    let divergence = dist.clone().detach().kl(&dist_of_changed)?.mean();
-    let difference = (values_of_changed - values.clone().detach()).square().mean();
+    let of_changed = outputs(nets, changed, batch, config, moment)?;
+    let divergence = dist.clone().detach().kl(&of_changed.dist)?.mean();
+    let difference = (of_changed.values - values.clone().detach()).square().mean();
     Ok(Some(divergence + difference))
 }
 

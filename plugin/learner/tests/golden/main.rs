@@ -2,13 +2,14 @@
 //! principles.
 //!
 //! The cases of PyTorch lie in `tests/fixtures/numerics`, or in the folder that the environment variable
-//! `PLAYBOT_GOLDEN` names; those of variants of SAC lie in `tests/fixtures/sac_variants`, that of memory in
-//! `tests/fixtures/memory`, beside the scripts that make them.
+//! `PLAYBOT_GOLDEN` names; those of variants of SAC, of curiosity and of memory lie in `tests/fixtures/sac_variants`,
+//! `tests/fixtures/curiosity` and `tests/fixtures/memory`, beside the scripts that make them.
 
 #![allow(clippy::disallowed_methods, reason = "tests compare with the system's functions")]
 
 mod adam;
 mod case;
+mod curiosity;
 mod fixed;
 mod gae;
 mod generated;

@@ -30,7 +30,7 @@ fn nets(case: &Case, kind: DeviceKind) -> PpoNets {
     let mut critic = Critic::new(&shape, &mut rng, &device);
     case.fill(&mut actor, "param.", "actor", kind);
     case.fill(&mut critic, "param.", "critic", kind);
-    tracked(&PpoNets { actor, critic })
+    tracked(&PpoNets { actor, critic, intrinsic: None })
 }
 
 fn minibatch(case: &Case, kind: DeviceKind) -> Minibatch {
@@ -56,6 +56,7 @@ fn minibatch(case: &Case, kind: DeviceKind) -> Minibatch {
             returns: column("in.returns"),
         },
         teacher: None,
+        intrinsic_returns: None,
     }
 }
 

@@ -78,7 +78,7 @@ impl<'a> Update<'a> {
             adam_eps: case.number("adam_eps"),
             ..PpoConfig::default()
         };
-        Self { case, kind, config, score, nets: tracked(&PpoNets { actor, critic }), decoder }
+        Self { case, kind, config, score, nets: tracked(&PpoNets { actor, critic, intrinsic: None }), decoder }
     }
 
     fn run(mut self) {
@@ -163,6 +163,7 @@ impl<'a> Update<'a> {
                 returns: vector(pick("in.returns")),
             },
             teacher,
+            intrinsic_returns: None,
         }
     }
 

@@ -10,9 +10,9 @@ use crate::toy::{Driver, OBS, SPACE};
 use playbot_learner::nn::{Activation, CnnKind};
 use playbot_learner::rng::{Streams, normal};
 use playbot_learner::{
-    ActionSpace, Actions, Dataset, DatasetEpisode, DeviceKind, ImageShape, Instructions, Learner, Policy, PolicyOutput,
-    PolicySpec, PpoConfig, PpoLearner, Rollout, SacConfig, SacLearner, ScoreConfig, SkillConfig, SkillTrainer,
-    limit_by_environment,
+    ActionSpace, Actions, Curiosity, Dataset, DatasetEpisode, DeviceKind, ImageShape, Instructions, Learner, Policy,
+    PolicyOutput, PolicySpec, PpoConfig, PpoLearner, Rollout, SacConfig, SacLearner, ScoreConfig, SkillConfig,
+    SkillTrainer, UpdateMetrics, limit_by_environment,
 };
 
 fn numbers(n: usize) -> Vec<f32> {
@@ -249,6 +249,34 @@ fn ppo_of_images_has_the_same_bits_everywhere() {
             let output = learner.policy().forward(&[], &pixels(16), 16).expect("finite");
             output.head.iter().chain(&output.values).fold(hash, mix)
         })
+    });
+}
+
+#[test]
+fn curiosity_has_the_same_bits_everywhere() {
+    same_everywhere("curiosity_has_the_same_bits_everywhere", 0xe997_85d9_cb74_101f, || {
+        let curiosity = Curiosity::rnd();
+        let config_of_vectors = PpoConfig { curiosity: curiosity.clone(), ..config() };
+        let spec = PolicySpec { obs: OBS.into(), latent: 0, action_space: SPACE };
+        let mut learner = PpoLearner::new(config_of_vectors, spec, 1, DeviceKind::Flex).expect("good settings");
+        let mut driver = Driver::new(64, 1);
+        let mut hash = 0;
+        let mut seen = |of_update: UpdateMetrics| {
+            let numbers = [of_update.intrinsic_reward, of_update.predictor_loss, of_update.intrinsic_value_loss];
+            hash = numbers.iter().flatten().fold(hash, mix);
+        };
+        for _ in 0..2 {
+            seen(learner.update(&driver.rollout(&learner, 32)).expect("finite"));
+        }
+        let cnn = CnnKind::Impala { channels: vec![16, 32], feature: 64 };
+        let config_of_images = PpoConfig { cnn, epochs: 1, curiosity, ..image_task::config() };
+        let spec = PolicySpec { obs: SCREEN.into(), latent: 0, action_space: ActionSpace::Discrete(4) };
+        let mut learner = PpoLearner::new(config_of_images, spec, 1, DeviceKind::Flex).expect("good settings");
+        let played = pictures(&learner);
+        for _ in 0..2 {
+            seen(learner.update(&played).expect("finite"));
+        }
+        hash
     });
 }
 

@@ -5,8 +5,8 @@ use crate::{corridor, image_task, score, toy};
 use burn::cubecl::logging::{LaunchObservation, LaunchObserver};
 use playbot_learner::nn::CnnKind;
 use playbot_learner::{
-    Actions, DeviceKind, ImageShape, Learner, Observations, PolicySpec, PpoConfig, PpoLearner, Rollout, ScoreConfig,
-    SkillModel, SkillTrainer, Traffic, UpdateMetrics,
+    Actions, Curiosity, DeviceKind, ImageShape, Learner, Observations, PolicySpec, PpoConfig, PpoLearner, Rollout,
+    ScoreConfig, SkillModel, SkillTrainer, Traffic, UpdateMetrics,
 };
 use std::sync::{
     Arc,
@@ -81,6 +81,20 @@ fn ppo_on_images() {
     let config = PpoConfig { num_steps: 4, ..image_task::config() };
     let mut driver = image_task::Driver::new(8, 1);
     let make = |device| PpoLearner::new(config.clone(), spec, 1, device).expect("good settings");
+    learn_alike(make, |learner| driver.rollout(learner, 4));
+}
+
+#[test]
+fn curiosity_on_vectors_and_images() {
+    let curious = |config| PpoConfig { curiosity: Curiosity::rnd(), ..config };
+    let spec = PolicySpec { obs: toy::OBS.into(), latent: 0, action_space: toy::SPACE };
+    let mut driver = toy::Driver::new(8, 1);
+    let make = |device| PpoLearner::new(curious(corridor::config()), spec, 1, device).expect("good settings");
+    learn_alike(make, |learner| driver.rollout(learner, 8));
+    let spec = PolicySpec { obs: image_task::SHAPE.into(), latent: 0, action_space: image_task::SPACE };
+    let config = PpoConfig { num_steps: 4, ..image_task::config() };
+    let mut driver = image_task::Driver::new(8, 1);
+    let make = |device| PpoLearner::new(curious(config.clone()), spec, 1, device).expect("good settings");
     learn_alike(make, |learner| driver.rollout(learner, 4));
 }
 

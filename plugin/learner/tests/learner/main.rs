@@ -7,6 +7,7 @@ mod checkpoint;
 mod clock;
 mod corridor;
 mod critic_trunk;
+mod curiosity;
 mod damaged_files;
 mod determinism;
 mod errors;

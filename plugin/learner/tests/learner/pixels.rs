@@ -221,6 +221,7 @@ fn minibatch(rows: usize) -> Minibatch {
             returns: column(),
         },
         teacher: None,
+        intrinsic_returns: None,
     }
 }
 
@@ -230,7 +231,7 @@ fn nets() -> PpoNets {
     let actor = Actor::new(&shape, SPACE, StdKind::Vector, &mut rng, &device);
     let cnn = ImageNet::new(&image_task::cnn(), SHAPE, &mut rng, &device).expect("it fits");
     let critic = Critic::new(&shape, &mut rng, &device);
-    let mut nets = PpoNets { actor: Actor { cnn: Some(cnn), ..actor }, critic };
+    let mut nets = PpoNets { actor: Actor { cnn: Some(cnn), ..actor }, critic, intrinsic: None };
     // The head is small at the start, and so is its gradient for the trunk.
     nets.actor.net.head.weight = nets.actor.net.head.weight.clone() * 50.0;
     tracked(&nets)

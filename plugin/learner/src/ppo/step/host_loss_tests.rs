@@ -81,6 +81,7 @@ fn loss_metrics_and_gradient_are_those_of_the_tensors() {
             logit_offsets: None,
             inputs: NetInput::Joined(matrix(vec![0.0], 1, 1, &device)),
             ppo: PpoBatch { actions, old_log_probs: vector(old_log_probs, &device), advantages, old_values, returns },
+            intrinsic_returns: None,
             teacher: penalised.then(|| TeacherBatch {
                 dist: decoder,
                 confidence: vector(confidence, &device),
@@ -152,6 +153,7 @@ fn penalised(
             old_values: column(old_values),
             returns: column(returns),
         },
+        intrinsic_returns: None,
         teacher: Some(TeacherBatch {
             dist: of(matrix(decoder, n, choices, &device)),
             confidence: column(confidence),
@@ -215,6 +217,7 @@ fn actions_of_the_other_kind_are_refused() {
             returns: column(),
         },
         teacher: None,
+        intrinsic_returns: None,
     };
     let moment = UpdateSettings { lr: 1e-3, score: None, is_warming_up: false };
     let gaussian = dist(&mut rng, 1, 2, 3, &device);
