@@ -67,13 +67,13 @@ fn a_new_run_begins_with_the_weights_of_another_and_notes_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     three_runs(folder);
-    let begin = ["train", "--experiment", "b.ron", "--init-from", "runs/a/1", "--run", "runs/c"];
+    let begin = ["train", "--experiment", "b.ron", "--from", "runs/a/1", "--run", "runs/c"];
     let train = |more: &[&str], wanted| ended(folder, &[&begin[..], more].concat(), wanted).1;
     for (more, words) in [
         (&["--algorithm", "sac"][..], "it was trained by ppo, and the new one is by sac: add --algorithm ppo"),
         (
             &["--algorithm", "ppo", "--set", "ppo.hidden=[4]"],
-            "it has other hidden layers or convolutions than the new run",
+            "no layer of its policy fits: its hidden layers are [8, 8], and those of the new run [4]",
         ),
         (
             &["--algorithm", "ppo", "--set", "train=easy:4..5", "--set", "test=easy:0..1"],
@@ -88,13 +88,16 @@ fn a_new_run_begins_with_the_weights_of_another_and_notes_it() {
         assert!(!folder.join("runs/c").exists(), "{more:?}");
     }
     let reported = train(&["--algorithm", "ppo"], 0);
-    assert!(reported.contains("beginning with the weights of runs/a/1"), "{reported}");
+    assert!(reported.contains("beginning with the weights of runs/a/1: taken: actor.l0, actor.l1"), "{reported}");
+    assert!(reported.contains("the first policy gives the same outputs as the old one, to the bit"), "{reported}");
     let row = &json_lines(&ended(folder, &["runs", "ls", "runs/c", "--json"], 0).0)[0];
-    assert_eq!(row["begun_from"], serde_json::json!({ "run": "runs/a/1", "step": 512 }));
+    let begun = &row["begun_from"];
+    assert_eq!((&begun["run"], &begun["step"], &begun["algorithm"]), (&"runs/a/1".into(), &512.into(), &"ppo".into()));
+    assert_eq!(begun["checksum"].as_str().map(str::len), Some(8));
     let (shown, _) = ended(folder, &["runs", "show", "runs/c"], 0);
     assert!(shown.contains("begun with the weights of runs/a/1 at step 512"), "{shown}");
     let (_, refused) = ended(folder, &["train", "--run", "runs/c", "--resume", "--set", "ppo.lr=0.5"], 3);
-    assert!(refused.contains("--init-from runs/c to begin with the weights of this one"), "{refused}");
+    assert!(refused.contains("--from runs/c to begin with the weights of this one"), "{refused}");
 }
 
 #[test]

@@ -11,17 +11,21 @@
 //! - `on_device`: an update on a graphics card: the rollout is sent once, and the numbers of all steps are read back
 //!   together.
 //! - `metrics`: metrics of a gradient step and of an update.
+//! - `imitation`: the policy fitted to labelled observations.
+//! - `take_over`: the start from another run's networks.
 
 mod batch;
 mod config;
+mod imitation;
 mod metrics;
 mod objective;
 mod on_device;
 mod schedule;
 mod step;
+mod take_over;
 
 use crate::{
-    DeviceKind, FileError, LearnError, ObsKind, ObsSlice, Observations, PolicySpec, Rollout,
+    DeviceKind, FileError, LearnError, ObsKind, ObsSlice, Observations, PolicySpec, Rollout, StartFrom, TakenOver,
     device::{guarded, update_on},
     file::{FileKind, TensorFile},
     learner::{Checkpoint, ContinuedSchedule, Learner, LearnerBase, LearnerMetrics},
@@ -44,6 +48,7 @@ use std::{cell::Cell, path::Path, time::Instant};
 
 pub use crate::ppo::{
     config::PpoConfig,
+    imitation::{ImitationConfig, LabelledSteps},
     metrics::{RatioStats, StepMetrics, UpdateMetrics, explained_variance, ratio_stats},
     objective::{Advantages, PpoBatch, PpoLoss, gae, normalize_advantages, ppo_loss},
     step::{Minibatch, gradient_step},
@@ -190,9 +195,9 @@ impl Learner for PpoLearner {
         self.checkpoint(path)?.write()
     }
 
-    fn start_from(&mut self, path: &Path) -> Result<(), FileError> {
-        let other = Self::load(path, self.base.device)?;
-        self.take_over(other).map_err(|source| FileError::Learner { path: path.to_owned(), source })
+    fn start_from(&mut self, start: &StartFrom<'_>) -> Result<TakenOver, FileError> {
+        let other = Self::load(start.path, self.base.device)?;
+        self.take_over(other, start).map_err(|source| FileError::Learner { path: start.path.to_owned(), source })
     }
 
     fn set_total_updates(&mut self, total: Option<u64>) -> Option<ContinuedSchedule> {
@@ -266,33 +271,6 @@ impl PpoLearner {
         let steps = self.config.epochs * self.config.minibatches.min(rollout.rows());
         let has = Has { penalty: batch.teacher.is_some(), augmentation: !self.config.augment.is_empty() };
         Ok(UpdateMetrics::mean(&sum, steps, has, explained_variance, lr))
-    }
-
-    /// Takes over weights and normalisers.
-    ///
-    /// # Errors
-    /// [`LearnError::Config`] names the part in which the networks differ.
-    fn take_over(&mut self, other: Self) -> Result<(), LearnError> {
-        let shape = |learner: &Self| actor_shape(&learner.config, &learner.base);
-        let critic = |learner: &Self| critic_shape(&learner.config, &shape(learner));
-        let counts = |learner: &Self| learner.base.score_config().is_some_and(|score| score.critic_clock);
-        let norm_obs = |learner: &Self| learner.base.observations.is_some();
-        let differences = [
-            ("other observations, actions or skills", self.base.spec != other.base.spec),
-            ("other hidden layers or convolutions", shape(self) != shape(&other) || critic(self) != critic(&other)),
-            ("another `score.critic_clock`", counts(self) != counts(&other)),
-            ("another `ppo.norm_obs`", norm_obs(self) != norm_obs(&other)),
-        ];
-        if let Some((what, _)) = differences.into_iter().find(|(_, differs)| *differs) {
-            return Err(LearnError::Config(format!("it has {what} than the new run: give both the same")));
-        }
-        self.nets = tracked(&other.nets);
-        self.base.observations = other.base.observations;
-        if let (Some(own), Some(theirs)) = (&mut self.base.rewards, other.base.rewards) {
-            own.stats = theirs.stats;
-        }
-        self.is_continuation = true;
-        Ok(())
     }
 
     fn schedule(&self) -> Schedule<'_> {
