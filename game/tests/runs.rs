@@ -380,3 +380,41 @@ fn a_short_quickstart_has_the_same_bytes_on_every_machine() {
         assert_eq!(found, wanted, "{found:#x?} on {threads} threads, {instructions}");
     }
 }
+
+#[test]
+fn a_demonstrator_is_asked_and_its_policy_is_measured_and_trained_further() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let settings = r#"(game: "coinrun", train: "easy:0..4", test: "easy:5..6", demos: None, steps: 256, arenas: 4, worlds: 2,
+        algorithm: "ppo", ppo: (num_steps: 16, minibatches: 2, hidden: [8, 8]), imitation: (steps: 64, rounds: 2))"#;
+    fs::write(folder.join("a.ron"), settings).expect("writable");
+    let begin = ["imitate", "--experiment", "a.ron", "--run", "runs/asked"];
+    let (_, refused) = ended(folder, &begin, 3);
+    assert!(
+        refused.contains("nothing to imitate: name recordings with --demos, or ask the game's demonstrator"),
+        "{refused}"
+    );
+    let (_, reported) = ended(folder, &[&begin[..], &["--dagger"]].concat(), 0);
+    let words = [
+        "imitating on easy:0..3, and measuring rounds on easy:4..4",
+        "round 2: 128 steps, loss ",
+        "the policy of round ",
+    ];
+    assert!(words.iter().all(|words| reported.contains(words)), "{reported}");
+    let (measured, _) = ended(folder, &["eval", "--run", "runs/asked", "--json"], 0);
+    assert_eq!(json_lines(&measured)[0]["method"], "imitation");
+    let (_, finished) = ended(folder, &["imitate", "--run", "runs/asked", "--resume"], 0);
+    assert!(finished.contains("runs/asked is finished"), "{finished}");
+    let (_, refused) = ended(folder, &["imitate", "--run", "runs/asked", "--resume", "--set", "imitation.lr=0.1"], 3);
+    assert!(refused.contains("is resumed with its own settings: leave out"), "{refused}");
+    let (_, refused) = ended(folder, &["train", "--run", "runs/asked", "--resume"], 3);
+    assert!(refused.contains("is a run of imitation: go on with `"), "{refused}");
+
+    let further = ["train", "--experiment", "a.ron", "--from", "runs/asked", "--run", "runs/further"];
+    let (_, reported) = ended(folder, &further, 0);
+    assert!(reported.contains("critic.l0 (the other run has not trained it)"), "{reported}");
+    let (shown, _) = ended(folder, &["runs", "show", "runs/further"], 0);
+    assert!(shown.contains("begun with the weights of runs/asked at step 128 (imitation, checksum "), "{shown}");
+    let (_, refused) = ended(folder, &["imitate", "--run", "runs/further", "--resume"], 3);
+    assert!(refused.contains("runs/further is a run of ppo, not of imitation"), "{refused}");
+}
