@@ -67,13 +67,13 @@ fn a_new_run_begins_with_the_weights_of_another_and_notes_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     three_runs(folder);
-    let begin = ["train", "--experiment", "b.ron", "--init-from", "runs/a/1", "--run", "runs/c"];
+    let begin = ["train", "--experiment", "b.ron", "--from", "runs/a/1", "--run", "runs/c"];
     let train = |more: &[&str], wanted| ended(folder, &[&begin[..], more].concat(), wanted).1;
     for (more, words) in [
         (&["--algorithm", "sac"][..], "it was trained by ppo, and the new one is by sac: add --algorithm ppo"),
         (
             &["--algorithm", "ppo", "--set", "ppo.hidden=[4]"],
-            "it has other hidden layers or convolutions than the new run",
+            "no layer of its policy fits: its hidden layers are [8, 8], and those of the new run [4]",
         ),
         (
             &["--algorithm", "ppo", "--set", "train=easy:4..5", "--set", "test=easy:0..1"],
@@ -88,13 +88,16 @@ fn a_new_run_begins_with_the_weights_of_another_and_notes_it() {
         assert!(!folder.join("runs/c").exists(), "{more:?}");
     }
     let reported = train(&["--algorithm", "ppo"], 0);
-    assert!(reported.contains("beginning with the weights of runs/a/1"), "{reported}");
+    assert!(reported.contains("beginning with the weights of runs/a/1: taken: actor.l0, actor.l1"), "{reported}");
+    assert!(reported.contains("the first policy gives the same outputs as the old one, to the bit"), "{reported}");
     let row = &json_lines(&ended(folder, &["runs", "ls", "runs/c", "--json"], 0).0)[0];
-    assert_eq!(row["begun_from"], serde_json::json!({ "run": "runs/a/1", "step": 512 }));
+    let begun = &row["begun_from"];
+    assert_eq!((&begun["run"], &begun["step"], &begun["algorithm"]), (&"runs/a/1".into(), &512.into(), &"ppo".into()));
+    assert_eq!(begun["checksum"].as_str().map(str::len), Some(8));
     let (shown, _) = ended(folder, &["runs", "show", "runs/c"], 0);
     assert!(shown.contains("begun with the weights of runs/a/1 at step 512"), "{shown}");
     let (_, refused) = ended(folder, &["train", "--run", "runs/c", "--resume", "--set", "ppo.lr=0.5"], 3);
-    assert!(refused.contains("--init-from runs/c to begin with the weights of this one"), "{refused}");
+    assert!(refused.contains("--from runs/c to begin with the weights of this one"), "{refused}");
 }
 
 #[test]
@@ -376,4 +379,42 @@ fn a_short_quickstart_has_the_same_bytes_on_every_machine() {
         ];
         assert_eq!(found, wanted, "{found:#x?} on {threads} threads, {instructions}");
     }
+}
+
+#[test]
+fn a_demonstrator_is_asked_and_its_policy_is_measured_and_trained_further() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let settings = r#"(game: "coinrun", train: "easy:0..4", test: "easy:5..6", demos: None, steps: 256, arenas: 4, worlds: 2,
+        algorithm: "ppo", ppo: (num_steps: 16, minibatches: 2, hidden: [8, 8]), imitation: (steps: 64, rounds: 2))"#;
+    fs::write(folder.join("a.ron"), settings).expect("writable");
+    let begin = ["imitate", "--experiment", "a.ron", "--run", "runs/asked"];
+    let (_, refused) = ended(folder, &begin, 3);
+    assert!(
+        refused.contains("nothing to imitate: name recordings with --demos, or ask the game's demonstrator"),
+        "{refused}"
+    );
+    let (_, reported) = ended(folder, &[&begin[..], &["--dagger"]].concat(), 0);
+    let words = [
+        "imitating on easy:0..3, and measuring rounds on easy:4..4",
+        "round 2: 128 steps, loss ",
+        "the policy of round ",
+    ];
+    assert!(words.iter().all(|words| reported.contains(words)), "{reported}");
+    let (measured, _) = ended(folder, &["eval", "--run", "runs/asked", "--json"], 0);
+    assert_eq!(json_lines(&measured)[0]["method"], "imitation");
+    let (_, finished) = ended(folder, &["imitate", "--run", "runs/asked", "--resume"], 0);
+    assert!(finished.contains("runs/asked is finished"), "{finished}");
+    let (_, refused) = ended(folder, &["imitate", "--run", "runs/asked", "--resume", "--set", "imitation.lr=0.1"], 3);
+    assert!(refused.contains("is resumed with its own settings: leave out"), "{refused}");
+    let (_, refused) = ended(folder, &["train", "--run", "runs/asked", "--resume"], 3);
+    assert!(refused.contains("is a run of imitation: go on with `"), "{refused}");
+
+    let further = ["train", "--experiment", "a.ron", "--from", "runs/asked", "--run", "runs/further"];
+    let (_, reported) = ended(folder, &further, 0);
+    assert!(reported.contains("critic.l0 (the other run has not trained it)"), "{reported}");
+    let (shown, _) = ended(folder, &["runs", "show", "runs/further"], 0);
+    assert!(shown.contains("begun with the weights of runs/asked at step 128 (imitation, checksum "), "{shown}");
+    let (_, refused) = ended(folder, &["imitate", "--run", "runs/further", "--resume"], 3);
+    assert!(refused.contains("runs/further is a run of ppo, not of imitation"), "{refused}");
 }

@@ -33,6 +33,7 @@ pub fn run_info(experiment: &Experiment) -> RunInfo {
         skills: None,
         seen: None,
         begun_from: None,
+        observed: Vec::new(),
         device: DeviceKind::Flex,
     }
 }

@@ -39,6 +39,7 @@ fn trained(path: &Path) {
         skills: None,
         seen: None,
         begun_from: None,
+        observed: Vec::new(),
         device: DeviceKind::Flex,
     };
     let run = RunDir::create(path, &experiment, &info, false).expect("writable");

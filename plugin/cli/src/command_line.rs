@@ -9,9 +9,9 @@ use crate::{
     progress,
     progress::interrupt,
     verbs::{
-        bench, bisect, bugs, completions, config, demo, doctor, eval, explore, eyes, history, init, learn_skills,
-        level, levels, play, policy, quickstart, record, replay, report, review, runs, skills, study, teach, test,
-        trace, train, view, watch,
+        bench, bisect, bugs, completions, config, demo, doctor, eval, explore, eyes, history, imitate, init,
+        learn_skills, level, levels, play, policy, quickstart, record, replay, report, review, runs, skills, study,
+        teach, test, trace, train, view, watch,
     },
 };
 use bevy_playbot::unknown_name::{nearest, question};
@@ -88,6 +88,7 @@ enum Verb {
     Doctor(doctor::Args),
     Teach(teach::Args),
     LearnSkills(learn_skills::Args),
+    Imitate(imitate::Args),
     Train(train::Args),
     Study(study::Args),
     Config(config::Args),
@@ -277,6 +278,7 @@ fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
     let threads = match &verb {
         Verb::Quickstart(args) => args.threads.count(),
         Verb::LearnSkills(args) => args.compute.threads(),
+        Verb::Imitate(args) => args.compute.threads(),
         Verb::Teach(args) => args.compute.threads(),
         Verb::Train(args) => args.compute.threads(),
         Verb::Study(args) => args.compute.threads(),
@@ -300,6 +302,7 @@ fn run_on_threads(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
         Verb::Demo(args) => demo::run(args, games),
         Verb::Doctor(args) => doctor::run(args, games),
         Verb::LearnSkills(args) => learn_skills::run(args, games),
+        Verb::Imitate(args) => imitate::run(args, games),
         Verb::Teach(args) => teach::run(args, games),
         Verb::Train(args) => train::run(args, games),
         Verb::Study(args) => study::run(args, games),

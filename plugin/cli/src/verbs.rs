@@ -5,7 +5,7 @@
 //!   [`report`], [`history`], [`bisect`], [`bugs`].
 //! - See levels and episodes: [`level`], [`trace`], [`view`], [`eyes`], [`skills`], [`play`].
 //! - Record: [`record`], [`demo`].
-//! - Learn: [`quickstart`], [`teach`], [`learn_skills`], [`train`], [`study`], [`eval`], [`config`], [`runs`],
+//! - Learn: [`quickstart`], [`teach`], [`learn_skills`], [`imitate`], [`train`], [`study`], [`eval`], [`config`], [`runs`],
 //!   [`policy`], [`bench`].
 //! - Use the shell: [`completions`].
 //!
@@ -25,6 +25,7 @@ pub(crate) mod eval;
 pub(crate) mod explore;
 pub(crate) mod eyes;
 pub(crate) mod history;
+pub(crate) mod imitate;
 pub(crate) mod init;
 pub(crate) mod learn_skills;
 pub(crate) mod level;

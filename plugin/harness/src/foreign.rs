@@ -164,6 +164,7 @@ impl ForeignGame {
             level: None,
             loaded: None,
             demonstrator: None,
+            cannot_be_asked: None,
             bots: Vec::new(),
             hash: None,
             default_plugins: None,
@@ -458,6 +459,12 @@ impl ForeignGame {
         })
     }
 
+    /// Declares that the [`demonstrator`](Self::demonstrator) cannot be asked for its action in states that it has not led
+    /// to, for this reason, such as a plan that it follows step by step. `playbot imitate --dagger` then refuses it.
+    pub fn demonstrator_cannot_be_asked(self, why: &'static str) -> Self {
+        self.with(|description| description.cannot_be_asked = Some(why))
+    }
+
     /// Adds a scripted bot that tests the game, such as one that walks everywhere, or one that plays badly on purpose. Its
     /// system returns the action of each tick, as that of the [`demonstrator`](Self::demonstrator) does. Several calls add
     /// up. A name that another bot has is a [`problem`](crate::game::Game::problem).
@@ -690,6 +697,10 @@ impl BotTools for ForeignGame {
     fn attach_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
         Renewal::carry_component::<ForeignBot>(world);
         world.entity_mut(agent).insert(ForeignBot { name: None, noise });
+    }
+
+    fn cannot_be_asked(&self) -> Option<String> {
+        self.description.cannot_be_asked.map(str::to_owned)
     }
 
     fn scripted_bots(&self) -> Vec<&'static str> {

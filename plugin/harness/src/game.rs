@@ -608,6 +608,13 @@ pub trait BotTools: Send + Sync {
     /// each value.
     fn attach_demonstrator(&self, _world: &mut World, _agent: Entity, _noise: f64) {}
 
+    /// Returns the reason for which the demonstrator cannot be asked for its action in states that it has not led to;
+    /// `None`, by default, if it can, because it decides by the state alone, or notices that others have acted. A bot that
+    /// follows a fixed plan step by step cannot be asked.
+    fn cannot_be_asked(&self) -> Option<String> {
+        None
+    }
+
     /// Returns the names of further scripted bots, which test the game. They differ from all other names of bots.
     fn scripted_bots(&self) -> Vec<&'static str> {
         Vec::new()

@@ -1,14 +1,14 @@
 //! The common interface and frame of all learners.
 
 use crate::{
-    DeviceKind, FileError, LearnError, ObsSlice, PolicySpec, Rollout,
+    DeviceKind, FileError, InputMap, LearnError, ObsSlice, PolicySpec, Rollout, StartFrom, TakenOver,
     device::guarded,
     file::{FileKind, TensorFile},
     norm::{ObsNormalizer, ObsStats, RewardNormalizer, put_normalizers, take_normalizers},
     policy::{Actor, Critic, Policy, StateBatch},
     rng::Streams,
     score::{ScoreConfig, Teacher, TiedTo},
-    skill::{Prior, SkillDescription, SkillSource},
+    skill::{Prior, SkillDescription, SkillModel, SkillSource},
 };
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::{fmt::Debug, path::Path, sync::Arc, time::Duration};
@@ -64,15 +64,27 @@ pub trait Learner: Debug + Send {
         None
     }
 
-    /// Takes over weights and normalisers from the checkpoint of another run, before the first update. Counters and the
-    /// optimiser stay those of a new learner.
+    /// Takes over the layers that fit and the normalisers from the checkpoint of another run, before the first update.
+    /// Counters stay those of a new learner, and so does the optimiser, unless its moments are asked for.
     ///
     /// # Errors
-    /// [`FileError`] if the file cannot be read, its networks are not those of this learner, or the algorithm cannot
-    /// start from another run.
-    fn start_from(&mut self, path: &Path) -> Result<(), FileError> {
-        let source = LearnError::Config("only ppo and score-ppo can start from the weights of another run".to_owned());
-        Err(FileError::Learner { path: path.to_owned(), source })
+    /// [`FileError`] if the file cannot be read, no layer of its policy fits, or the algorithm cannot start from another
+    /// run.
+    fn start_from(&mut self, start: &StartFrom<'_>) -> Result<TakenOver, FileError> {
+        let text = "only ppo, score-ppo and spirl-ppo can start from the weights of another run".to_owned();
+        Err(FileError::Learner { path: start.path.to_owned(), source: LearnError::Config(text) })
+    }
+
+    /// Returns its skill model for the start of another learner, or for one with a longer observation by `inputs`; `None`
+    /// without skills. A learner keeps no encoder, so the model can be used and not saved.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if `inputs` are those of another observation.
+    fn skill_model(&self, inputs: Option<&InputMap>) -> Result<Option<SkillModel>, LearnError> {
+        let base = self.base();
+        let Some(teacher) = &base.teacher else { return Ok(None) };
+        let (actors, description) = (&teacher.actors, &teacher.description);
+        SkillModel::of_actors(actors, description, teacher.stats.as_deref(), inputs, base.device).map(Some)
     }
 
     /// Returns the inputs and outputs of the policy. With a skill model rollouts need skills even if `latent` is 0

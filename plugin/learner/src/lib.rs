@@ -38,6 +38,7 @@
 
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests compare with the system's functions"))]
 
+mod begin_from;
 mod device;
 pub mod disk;
 mod error;
@@ -62,6 +63,7 @@ mod space;
 pub mod spirl;
 
 pub use crate::{
+    begin_from::{InputMap, StartFrom, TakenOver},
     device::{DeviceKind, Traffic, UnknownDevice},
     disk::{write_atomically, write_atomically_with},
     error::{FileError, HasExitCode, LearnError, SettingError, brief_number, io_exit_code},
@@ -71,7 +73,7 @@ pub use crate::{
     observation::{Augmentation, ImageShape, ObsKind, ObsSlice, Observations, PictureMetadata},
     policy::{MemoryKind, Policy, PolicyOutput, StdKind},
     policy_file::{PolicyFile, PolicyMetadata},
-    ppo::{Curiosity, PpoConfig, PpoLearner, UpdateMetrics},
+    ppo::{Curiosity, ImitationConfig, LabelledSteps, PpoConfig, PpoLearner, UpdateMetrics},
     rng::{RngState, Streams},
     rollout::{EndStates, ObsColumns, Rollout, RolloutStep},
     sac::{EntropyCoef, RlpdConfig, SacConfig, SacLearner, SacMetrics},

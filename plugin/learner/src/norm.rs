@@ -71,17 +71,19 @@ fn inverse_deviation(var: f64) -> f64 {
 pub struct ObsNormalizer {
     /// Statistics of all observations so far.
     pub stats: RunningStats,
+    /// Rows of each value, plus 1e-4, if some values came later than others; empty otherwise.
+    pub(crate) counts: Vec<f64>,
 }
 
 impl ObsNormalizer {
     /// Creates a normaliser without data.
     pub fn new(dim: usize) -> Self {
-        Self { stats: RunningStats::new(dim) }
+        Self { stats: RunningStats::new(dim), counts: Vec::new() }
     }
 
     /// Adds rows of observations.
     pub fn update(&mut self, rows: &[f32]) {
-        self.stats.update_rows(rows);
+        self.stats.update_rows(rows, &mut self.counts);
     }
 
     /// Returns the present mean and scale 1/√(var + 1e-8).
@@ -242,8 +244,9 @@ impl RunningStats {
         self.add(mean.into_iter().zip(squares), count);
     }
 
-    /// Does [`Self::update`] for many rows, with threads that take a few dimensions each.
-    fn update_rows(&mut self, rows: &[f32]) {
+    /// Does [`Self::update`] for many rows, with threads that take a few dimensions each. `counts` are the rows of each
+    /// dimension, if they differ.
+    fn update_rows(&mut self, rows: &[f32], counts: &mut [f64]) {
         let dim = self.dim();
         let count = rows.len().checked_div(dim).unwrap_or_default() as f64;
         if count == 0.0 {
@@ -261,19 +264,32 @@ impl RunningStats {
                 pairs.for_each(|((mean, squares), &x)| *squares += (f64::from(x) - *mean).powi(2));
             }
         });
-        self.add(batch.into_iter(), count);
+        if counts.is_empty() {
+            return self.add(batch.into_iter(), count);
+        }
+        let before = self.count;
+        for (d, (of_dim, batch)) in counts.iter_mut().zip(batch).enumerate() {
+            self.add_dim(d, batch, (*of_dim, count));
+            *of_dim += count;
+        }
+        self.count = before + count;
     }
 
     /// Adds a batch of `count` rows, by the mean and the sum of squared deviations of each dimension.
     fn add(&mut self, batch: impl Iterator<Item = (f64, f64)>, count: f64) {
-        let total = self.count + count;
-        for (d, (mean, squares)) in batch.enumerate() {
-            let delta = mean - self.mean[d];
-            let spread = squares + self.var[d] * self.count + delta * delta * self.count * count / total;
-            self.mean[d] += delta * count / total;
-            self.var[d] = spread / total;
+        for (d, batch) in batch.enumerate() {
+            self.add_dim(d, batch, (self.count, count));
         }
-        self.count = total;
+        self.count += count;
+    }
+
+    /// Adds the mean and the sum of squared deviations of `count` rows to a dimension that had `before`.
+    fn add_dim(&mut self, d: usize, (mean, squares): (f64, f64), (before, count): (f64, f64)) {
+        let total = before + count;
+        let delta = mean - self.mean[d];
+        let spread = squares + self.var[d] * before + delta * delta * before * count / total;
+        self.mean[d] += delta * count / total;
+        self.var[d] = spread / total;
     }
 }
 
@@ -287,6 +303,9 @@ pub(crate) fn put_normalizers(
 ) {
     if let Some(normalizer) = observations {
         put_stats(file, "obs_norm", &normalizer.stats);
+        if !normalizer.counts.is_empty() {
+            file.put_f64("obs_norm.counts", &normalizer.counts);
+        }
     }
     if let Some(normalizer) = rewards {
         put_stats(file, "reward_norm", &normalizer.stats);
@@ -302,6 +321,9 @@ pub(crate) fn take_normalizers(
 ) -> Result<(), FileError> {
     if let Some(normalizer) = observations {
         take_stats(file, "obs_norm", &mut normalizer.stats)?;
+        if file.has("obs_norm.counts") {
+            normalizer.counts = file.take_f64("obs_norm.counts", Some(normalizer.stats.dim()))?;
+        }
     }
     if let Some(normalizer) = rewards {
         take_stats(file, "reward_norm", &mut normalizer.stats)?;

@@ -13,19 +13,23 @@
 //! - `on_device`: an update on a graphics card: the rollout is sent once, and the numbers of all steps are read back
 //!   together.
 //! - `metrics`: metrics of a gradient step and of an update.
+//! - `imitation`: the policy fitted to labelled observations.
+//! - `take_over`: the start from another run's networks.
 
 mod batch;
 mod config;
 mod curiosity;
+mod imitation;
 mod metrics;
 mod objective;
 mod on_device;
 mod schedule;
 mod sequences;
 mod step;
+mod take_over;
 
 use crate::{
-    DeviceKind, FileError, LearnError, ObsKind, ObsSlice, Observations, PolicySpec, Rollout,
+    DeviceKind, FileError, LearnError, ObsKind, ObsSlice, Observations, PolicySpec, Rollout, StartFrom, TakenOver,
     device::{guarded, update_on},
     file::{FileKind, TensorFile},
     learner::{Checkpoint, ContinuedSchedule, Learner, LearnerBase, LearnerMetrics},
@@ -51,6 +55,7 @@ use std::{cell::Cell, path::Path, time::Instant};
 pub use crate::ppo::{
     config::PpoConfig,
     curiosity::{Curiosity, Predictor, RndNet, combined_advantages, endless_gae, prediction_errors},
+    imitation::{ImitationConfig, LabelledSteps},
     metrics::{RatioStats, StepMetrics, UpdateMetrics, explained_variance, ratio_stats},
     objective::{Advantages, PpoBatch, PpoLoss, gae, intrinsic_value_loss, normalize_advantages, ppo_loss},
     step::{Minibatch, gradient_step},
@@ -207,9 +212,9 @@ impl Learner for PpoLearner {
         self.checkpoint(path)?.write()
     }
 
-    fn start_from(&mut self, path: &Path) -> Result<(), FileError> {
-        let other = Self::load(path, self.base.device)?;
-        self.take_over(other).map_err(|source| FileError::Learner { path: path.to_owned(), source })
+    fn start_from(&mut self, start: &StartFrom<'_>) -> Result<TakenOver, FileError> {
+        let other = Self::load(start.path, self.base.device)?;
+        self.take_over(other, start).map_err(|source| FileError::Learner { path: start.path.to_owned(), source })
     }
 
     fn set_total_updates(&mut self, total: Option<u64>) -> Option<ContinuedSchedule> {
@@ -298,42 +303,6 @@ impl PpoLearner {
         let has =
             Has { penalty: batch.teacher.is_some(), augmentation: !self.config.augment.is_empty(), curiosity: curious };
         Ok(UpdateMetrics::mean(&sum, steps, has, explained_variance, lr))
-    }
-
-    /// Takes over weights and normalisers.
-    ///
-    /// # Errors
-    /// [`LearnError::Config`] names the part in which the networks differ.
-    fn take_over(&mut self, other: Self) -> Result<(), LearnError> {
-        let shape = |learner: &Self| actor_shape(&learner.config, &learner.base);
-        let critic = |learner: &Self| critic_shape(&learner.config, &shape(learner));
-        let counts = |learner: &Self| learner.base.score_config().is_some_and(|score| score.critic_clock);
-        let norm_obs = |learner: &Self| learner.base.observations.is_some();
-        let differences = [
-            ("other observations, actions or skills", self.base.spec != other.base.spec),
-            ("other hidden layers or convolutions", shape(self) != shape(&other) || critic(self) != critic(&other)),
-            ("another `score.critic_clock`", counts(self) != counts(&other)),
-            ("another `ppo.norm_obs`", norm_obs(self) != norm_obs(&other)),
-            ("other networks of `ppo.curiosity`", !self.config.curiosity.predicts_like(&other.config.curiosity)),
-        ];
-        if let Some((what, _)) = differences.into_iter().find(|(_, differs)| *differs) {
-            return Err(LearnError::Config(format!("it has {what} than the new run: give both the same")));
-        }
-        // Curiosity that the other run did not have begins anew.
-        let intrinsic = match &self.nets.intrinsic {
-            Some(own) => Some(other.nets.intrinsic.clone().unwrap_or_else(|| own.clone())),
-            None => None,
-        };
-        self.nets = tracked(&PpoNets { intrinsic, ..other.nets });
-        if let (Some(own), Some(theirs)) = (&mut self.curiosity, other.curiosity) {
-            own.take_over(theirs);
-        }
-        self.base.observations = other.base.observations;
-        if let (Some(own), Some(theirs)) = (&mut self.base.rewards, other.base.rewards) {
-            own.stats = theirs.stats;
-        }
-        self.is_continuation = true;
-        Ok(())
     }
 
     fn schedule(&self) -> Schedule<'_> {

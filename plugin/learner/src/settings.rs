@@ -86,6 +86,8 @@ impl Reader {
     pub const RLPD: Self = Self::of("rlpd");
     /// Behaviour cloning.
     pub const BC: Self = Self::of("bc");
+    /// Imitation without skills.
+    pub const IMITATION: Self = Self::of("imitation");
 
     /// SPiRL with PPO, if the decoder learns.
     pub const SPIRL_PPO_DECODER: Self = Self::SPIRL_PPO.with("spirl.learn_decoder");

@@ -27,7 +27,9 @@ mod prior;
 mod trainer;
 
 use crate::{
-    ActionSpace, DeviceKind, FileError, ObsKind, PictureMetadata, PolicySpec, SeenLevels,
+    ActionSpace, DeviceKind, FileError, InputMap, LearnError, ObsKind, PictureMetadata, PolicySpec, SeenLevels,
+    Streams,
+    begin_from::{Fit, transplant},
     file::{FileKind, TensorFile},
     nn::frozen,
     norm::{ObsStats, put_obs_stats, take_obs_stats},
@@ -62,6 +64,8 @@ pub struct SkillModel {
     pub(crate) device: DeviceKind,
     picture: Option<PictureMetadata>,
     demos: Option<SeenLevels>,
+    /// False for a model out of a learner, which keeps decoder and prior only.
+    has_encoder: bool,
 }
 
 impl SkillModel {
@@ -72,7 +76,37 @@ impl SkillModel {
         device: DeviceKind,
     ) -> Self {
         let nets = SkillNets { state_heads: None, ..frozen(nets) };
-        Self { description, nets, stats, device, picture: None, demos: None }
+        Self { description, nets, stats, device, picture: None, demos: None, has_encoder: true }
+    }
+
+    /// Creates a model of decoder and prior alone, for their observation, or for a longer one by `inputs`. Both give the
+    /// same outputs, whatever the new values are. Without an encoder it can be used and not saved.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if `inputs` are those of another observation.
+    pub(crate) fn of_actors(
+        actors: &Actors,
+        description: &SkillDescription,
+        stats: Option<&ObsStats>,
+        inputs: Option<&InputMap>,
+        device: DeviceKind,
+    ) -> Result<Self, LearnError> {
+        let observation = match (description.observation, inputs) {
+            (ObsKind::Vector(_), Some(map)) => ObsKind::Vector(map.width()),
+            (observation, _) => observation,
+        };
+        let map = InputMap::between(inputs, description.observation, observation)?;
+        let description = SkillDescription { observation, ..description.clone() };
+        let SkillDescription { config, action_space, .. } = &description;
+        let mut nets = SkillNets::new(config, observation, *action_space, &Streams::new(0), &device.plain())?;
+        let fit = |latent| Fit { inputs: &map, latent, memory: 0, is_refused: None };
+        transplant(&mut nets.decoder, &actors.decoder, "decoder", fit(config.latent))?;
+        transplant(&mut nets.prior, &actors.prior, "prior", fit(0))?;
+        let stats = stats.map(|stats| match observation {
+            ObsKind::Vector(_) => Arc::new(map.frozen_stats(stats)),
+            ObsKind::Image(_) => Arc::new(stats.clone()),
+        });
+        Ok(Self { has_encoder: false, ..Self::new(description, &nets, stats, device) })
     }
 
     /// Adds metadata of the images that the model observes; `None` for vectors.
@@ -86,7 +120,7 @@ impl SkillModel {
     }
 
     /// Adds metadata of its demonstrations.
-    fn with_demos(self, demos: Option<SeenLevels>) -> Self {
+    pub fn with_demos(self, demos: Option<SeenLevels>) -> Self {
         Self { demos, ..self }
     }
 
@@ -156,6 +190,10 @@ impl SkillModel {
     /// their shape.
     pub fn save(&self, path: &Path) -> Result<(), FileError> {
         let (skill, picture, demos) = (self.description.clone(), self.picture.clone(), self.demos.clone());
+        if !self.has_encoder {
+            let text = "these skills come from a run, which keeps no encoder: save its policy instead".to_owned();
+            return Err(FileError::Learner { path: path.to_owned(), source: LearnError::Config(text) });
+        }
         if let Some(picture) = &picture {
             let learner = |source| FileError::Learner { path: path.to_owned(), source };
             picture.check(self.observation()).map_err(learner)?;
@@ -184,7 +222,8 @@ impl SkillModel {
         }
         let stats = description.take_stats(&mut file, "obs_norm")?;
         file.finish()?;
-        Ok(Self { description, nets, stats, device, picture: header.picture, demos: header.demos })
+        let (picture, demos) = (header.picture, header.demos);
+        Ok(Self { description, nets, stats, device, picture, demos, has_encoder: true })
     }
 }
 

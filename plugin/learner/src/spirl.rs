@@ -14,7 +14,8 @@ mod over_skills;
 mod skill_steps;
 
 use crate::{
-    DeviceKind, FileError, LearnError, ObsSlice, PolicySpec, PpoLearner, Rollout, SacLearner, TimeLimit,
+    DeviceKind, FileError, LearnError, ObsSlice, PolicySpec, PpoLearner, Rollout, SacLearner, StartFrom, TakenOver,
+    TimeLimit,
     file::{FileKind, TensorFile},
     learner::{ContinuedSchedule, LearnTimes, Learner, LearnerBase, LearnerMetrics},
     policy::Policy,
@@ -190,6 +191,23 @@ impl Learner for SpirlLearner {
     /// Saves the learner. The checkpoints of its learners are in it whole, as bytes `over_skills` and `below`.
     fn save(&self, path: &Path) -> Result<(), FileError> {
         self.checkpoint(path)?.write()
+    }
+
+    /// Takes over the policy over skills, if it learns by PPO, and the decoder's learner if both have one.
+    fn start_from(&mut self, start: &StartFrom<'_>) -> Result<TakenOver, FileError> {
+        let refuse = |source| FileError::Learner { path: start.path.to_owned(), source };
+        let other = Self::load(start.path, self.base().device)?;
+        let (OverSkills::Ppo(own), OverSkills::Ppo(theirs)) = (&mut self.over_skills, other.over_skills) else {
+            let text = "only a policy over skills by PPO can start from the weights of another one".to_owned();
+            return Err(refuse(LearnError::Config(text)));
+        };
+        let mut report = own.take_over(theirs, start).map_err(refuse)?;
+        if let (Some(own), Some(theirs)) = (&mut self.below, other.below) {
+            let of_decoder = own.take_over(theirs, start).map_err(refuse)?;
+            report.is_same_policy &= of_decoder.is_same_policy;
+            report.join(of_decoder);
+        }
+        Ok(report)
     }
 
     fn set_total_updates(&mut self, total: Option<u64>) -> Option<ContinuedSchedule> {

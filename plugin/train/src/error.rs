@@ -16,6 +16,14 @@ use playbot_learner::{FileError, HasExitCode, LearnError};
 use std::{io, path::PathBuf};
 use thiserror::Error;
 
+/// Returns what to do with an algorithm that the verb `train` does not train.
+fn instead_of_training(algorithm: Algorithm) -> &'static str {
+    match algorithm {
+        Algorithm::Imitation => "imitate with `playbot imitate`",
+        _ => "measure its skill model with `playbot eval --skills FILE`",
+    }
+}
+
 /// Failure of training.
 #[derive(Debug, Error)]
 pub enum TrainError {
@@ -35,7 +43,7 @@ pub enum TrainError {
     #[error("{0} trains on recordings with rewards, and there are none: name them in `demos`")]
     NoDemos(Algorithm),
     /// The algorithm does not learn from play.
-    #[error("{0} is not trained: measure its skill model with `playbot eval --skills FILE`")]
+    #[error("{0} is not trained: {advice}", advice = instead_of_training(*.0))]
     NotTrained(Algorithm),
     /// The skill model was learned for another game.
     #[error(

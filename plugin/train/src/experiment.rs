@@ -22,7 +22,7 @@ use playbot_harness::{
     eval::EvalPlan, game::Game, games::Games, inspect::ExperimentText, machine::MOST_WORLDS, split::LevelSplit,
 };
 use playbot_learner::{
-    PpoConfig, RlpdConfig, SacConfig, ScoreConfig, SkillConfig, SpirlConfig, settings,
+    ImitationConfig, PpoConfig, RlpdConfig, SacConfig, ScoreConfig, SkillConfig, SpirlConfig, settings,
     settings::{Range, is_off},
 };
 use serde::{Deserialize, Serialize, Serializer};
@@ -48,7 +48,8 @@ settings! {
     observation: ObservationKind = ObservationKind::default(), serde(default);
     /// Size and form of the pictures, for agents that see some.
     image: ImageOptions, keys of ImageOptions, serde(default);
-    /// Name of the algorithm: `score-ppo`, `ppo`, `score-sac`, `sac`, `spirl-ppo`, `spirl-sac`, `rlpd` or `bc`.
+    /// Name of the algorithm: `score-ppo`, `ppo`, `score-sac`, `sac`, `spirl-ppo`, `spirl-sac`, `rlpd` or `bc`; `imitation`
+    /// in the runs of the verb `imitate`.
     algorithm: Algorithm = score_ppo(), serde(default = "score_ppo");
     /// Levels to train on.
     train: LevelSplit, such as "\"hard:0..63\"";
@@ -83,6 +84,8 @@ settings! {
     ppo: PpoConfig, keys of PpoConfig, serde(default);
     /// The learner of score-sac, sac, spirl-sac and rlpd.
     sac: SacConfig, keys of SacConfig, serde(default);
+    /// Imitation of recordings or of a demonstrator, by the verb `imitate`. Its networks are those of `ppo`.
+    imitation: ImitationConfig, keys of ImitationConfig, serde(default);
     /// The three steps of SCORE.
     score: ScoreConfig, keys of ScoreConfig, serde(default);
     /// Additions of spirl-ppo and spirl-sac.
@@ -260,11 +263,13 @@ pub enum Algorithm {
     Rlpd,
     /// Behaviour cloning: the skill model's decoder under its prior, as learned from demonstrations.
     BehaviourCloning,
+    /// Imitation without skills, by the verb `imitate`: of recordings, or of a demonstrator that is asked (DAgger).
+    Imitation,
 }
 
 impl Algorithm {
     /// All algorithms.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::ScorePpo,
         Self::Ppo,
         Self::ScoreSac,
@@ -273,6 +278,7 @@ impl Algorithm {
         Self::SpirlSac,
         Self::Rlpd,
         Self::BehaviourCloning,
+        Self::Imitation,
     ];
 
     /// Algorithms that learn from play, see [`is_trained`](Self::is_trained).
@@ -290,6 +296,7 @@ impl Algorithm {
             Self::SpirlSac => "spirl-sac",
             Self::Rlpd => "rlpd",
             Self::BehaviourCloning => "bc",
+            Self::Imitation => "imitation",
         }
     }
 
@@ -297,7 +304,7 @@ impl Algorithm {
     pub fn needs_skills(self) -> bool {
         match self {
             Self::ScorePpo | Self::ScoreSac | Self::SpirlPpo | Self::SpirlSac | Self::BehaviourCloning => true,
-            Self::Ppo | Self::Sac | Self::Rlpd => false,
+            Self::Ppo | Self::Sac | Self::Rlpd | Self::Imitation => false,
         }
     }
 
@@ -316,16 +323,23 @@ impl Algorithm {
         self == Self::Rlpd
     }
 
-    /// Returns the learner whose settings apply. Behaviour cloning trains no learner; it has the settings of PPO.
+    /// Returns the learner whose settings apply. Behaviour cloning trains no learner; it has the settings of PPO, and so
+    /// do the networks of imitation.
     pub fn learner(self) -> LearnerKind {
         match self {
-            Self::ScorePpo | Self::Ppo | Self::SpirlPpo | Self::BehaviourCloning => LearnerKind::Ppo,
+            Self::ScorePpo | Self::Ppo | Self::SpirlPpo | Self::BehaviourCloning | Self::Imitation => LearnerKind::Ppo,
             Self::ScoreSac | Self::Sac | Self::SpirlSac | Self::Rlpd => LearnerKind::Sac,
         }
     }
 
-    /// Returns whether it learns from play; other algorithms are ready once they have their skills.
+    /// Returns whether it learns from the reward of its play, by the verb `train`. Behaviour cloning is ready once it has
+    /// its skills, and imitation has a verb of its own.
     pub fn is_trained(self) -> bool {
+        !matches!(self, Self::BehaviourCloning | Self::Imitation)
+    }
+
+    /// Returns whether its runs have checkpoints.
+    pub fn has_checkpoints(self) -> bool {
         self != Self::BehaviourCloning
     }
 }
@@ -472,7 +486,7 @@ mod tests {
     }
 
     #[test]
-    fn those_that_are_trained_are_all_but_cloning() {
+    fn those_that_are_trained_are_all_but_cloning_and_imitation() {
         let trained: Vec<_> = Algorithm::ALL.into_iter().filter(|algorithm| algorithm.is_trained()).collect();
         assert_eq!(trained, Algorithm::TRAINED);
     }

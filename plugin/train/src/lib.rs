@@ -12,16 +12,21 @@
 //! - [`trainer`]: the training loop, one update at a time ([`Trainer`]); [`collect`]: the Worlds that play for it.
 //! - [`train_run`]: a whole run ([`train_run::Training`]), with its folder ([`run_dir`]), checkpoints
 //!   ([`checkpoint`]), metrics ([`metrics_log`], [`tensorboard`]) and observer ([`run_observer`]).
+//! - [`begin_from`]: the start of a run from another one, and its ancestry ([`ancestor`]).
+//! - [`imitate`]: imitation of recordings, or of a demonstrator that is asked (DAgger).
 //! - [`policy_export`]: the one file that a game ships with.
 //! - [`lesson`]: from a recording to a policy that plays at once, and gets better.
 //! - [`runs`]: runs on disk, found and compared over seeds.
 //! - [`study`] and [`study_runner`]: variants of an experiment, each with every seed, and their tables.
 
+pub mod ancestor;
+pub mod begin_from;
 pub mod checkpoint;
 pub mod collect;
 pub mod demo;
 mod error;
 pub mod experiment;
+pub mod imitate;
 pub mod learn_skills;
 pub mod lesson;
 pub mod metrics_log;

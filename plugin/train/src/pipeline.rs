@@ -262,7 +262,7 @@ pub(crate) fn begin_or_resume(
         return Ok(Training::resume(game, opened, &wanted, setup)?);
     }
     let (skill_file, skills) = skills.unzip();
-    let new = NewRun { path: run, experiment, skills, skill_file, init_from: None, force: false };
+    let new = NewRun { path: run, experiment, skills, skill_file, from: None, force: false };
     Ok(Training::begin(game, &new, setup, observer)?)
 }
 

@@ -14,6 +14,7 @@
 //! A run is replaced in two steps: it is moved aside, and removed once the new one is written.
 
 use crate::{
+    ancestor::Ancestor,
     checkpoint,
     checkpoint::{Checkpoint, CheckpointChoice},
     collect::ArenaState,
@@ -69,21 +70,15 @@ pub struct RunInfo {
     /// The levels that it sees, with those of its recordings and its skills; missing in older runs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seen: Option<SeenLevels>,
-    /// The run whose weights it began with.
+    /// The run whose weights or skills it began with.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub begun_from: Option<BegunFrom>,
+    pub begun_from: Option<Ancestor>,
+    /// Names of the observed values, for runs that begin with it; none in older runs, and for pictures.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub observed: Vec<String>,
     /// Device that it was started on; the default one if the run does not name it.
     #[serde(default)]
     pub device: DeviceKind,
-}
-
-/// The run whose weights another run began with.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct BegunFrom {
-    /// Its folder, as it was named then.
-    pub run: PathBuf,
-    /// Environment steps of the checkpoint.
-    pub step: u64,
 }
 
 /// Saved state of training besides the learner.

@@ -532,7 +532,7 @@ impl<'a> StudyRunner<'a> {
         recorded: Option<SeenLevels>,
     ) -> Result<RunDir, StudyRunError> {
         let (file, path, experiment) = (self.skill_file(run)?, lock.folder().to_owned(), &run.experiment);
-        let new = NewRun { path: &path, experiment, skills, skill_file: Some(&file), init_from: None, force: true };
+        let new = NewRun { path: &path, experiment, skills, skill_file: Some(&file), from: None, force: true };
         let info = run_info(game, &new, recorded, &self.setup)?;
         Ok(RunDir::begin(lock, experiment, &info)?)
     }
@@ -573,11 +573,11 @@ impl<'a> StudyRunner<'a> {
         } else {
             Trainer::with_demos(game, experiment, skills.as_ref(), &rollouts, setup.device, setup.threads)?
         };
-        let mut training = Training { run: dir, trainer };
+        let mut training = Training { run: dir, trainer, started: None };
         if !training.drive(observer)? {
             return Ok(None);
         }
-        let Training { run: dir, trainer } = training;
+        let Training { run: dir, trainer, .. } = training;
         let player = Player::Policy { policy: trainer.policy(), prior: trainer.skill_prior(), draw };
         let training = Some(training_result(dir.path(), experiment, trainer.steps())?);
         let curves = learning_curves(dir.path())?;

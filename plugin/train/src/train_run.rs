@@ -1,21 +1,18 @@
 //! The training of a run: begun or resumed, logged and saved, stopped after any update.
 
 use crate::{
+    begin_from::{BeginError, BeginFrom, Origin, Started},
     checkpoint::CheckpointChoice,
     error::{RunError, TrainError},
     experiment::{Experiment, LearnerKind},
     metrics_log::UpdateReport,
     recordings::{Recorded, RecordingsError, read_rollouts},
-    run_dir::{BegunFrom, OpenedRun, RunDir, RunInfo, check_new},
+    run_dir::{OpenedRun, RunDir, RunInfo, check_new},
     run_observer::{RunEvent, RunObserver},
     trainer,
     trainer::Trainer,
 };
-use playbot_harness::{
-    game::Game,
-    held_out::{HeldOut, seen_by_training},
-    sealed_file::file_checksum,
-};
+use playbot_harness::{game::Game, held_out::seen_by_training, sealed_file::file_checksum};
 use playbot_learner::{ContinuedSchedule, DeviceKind, HasExitCode, SeenLevels, SkillModel};
 use playbot_report::{counted, whole};
 use std::path::{Path, PathBuf};
@@ -59,14 +56,9 @@ pub enum TrainingError {
         /// Folder of the run.
         run: PathBuf,
     },
-    /// A new run cannot begin with the weights of this run.
-    #[error("no run can begin with the weights of {}: {why}", run.display())]
-    BadStart {
-        /// Folder of the run with the weights.
-        run: PathBuf,
-        /// The reason.
-        why: String,
-    },
+    /// The run cannot begin with another one.
+    #[error(transparent)]
+    BadStart(Box<BeginError>),
     /// The experiment, game and skills do not fit one another, or the training cannot go on.
     #[error(transparent)]
     Train(Box<TrainError>),
@@ -81,6 +73,12 @@ pub enum TrainingError {
 impl From<TrainError> for TrainingError {
     fn from(error: TrainError) -> Self {
         Self::Train(error.into())
+    }
+}
+
+impl From<BeginError> for TrainingError {
+    fn from(error: BeginError) -> Self {
+        Self::BadStart(error.into())
     }
 }
 
@@ -100,7 +98,7 @@ impl HasExitCode for TrainingError {
     fn exit_code(&self) -> u8 {
         match self {
             Self::Diverged { .. } => 2,
-            Self::BadStart { .. } => 3,
+            Self::BadStart(error) => error.exit_code(),
             Self::NeverSaved { error, .. } | Self::NotSaved { error, .. } => error.exit_code(),
             Self::Train(error) => error.exit_code(),
             Self::Run(error) => error.exit_code(),
@@ -140,8 +138,8 @@ pub struct NewRun<'a> {
     pub skills: Option<&'a SkillModel>,
     /// The file of the skill model, whose checksum the run notes.
     pub skill_file: Option<&'a Path>,
-    /// The run with whose weights and normalisers of the last checkpoint it begins, if it does not begin anew.
-    pub init_from: Option<&'a Path>,
+    /// The run with whose weights, normalisers and skills it begins, if it does not begin anew.
+    pub from: Option<BeginFrom<'a>>,
     /// Replace an existing run.
     pub force: bool,
 }
@@ -152,6 +150,8 @@ pub struct Training {
     pub run: RunDir,
     /// The trainer.
     pub trainer: Trainer,
+    /// What it began with, if it has just begun with another run.
+    pub started: Option<Started>,
 }
 
 impl Training {
@@ -166,8 +166,13 @@ impl Training {
         setup: &TrainingSetup<'_>,
         observer: &mut dyn RunObserver,
     ) -> Result<Self, TrainingError> {
-        let NewRun { experiment, skills, .. } = *new;
+        let experiment = new.experiment;
         check_new(new.path, new.force)?;
+        let origin = match &new.from {
+            Some(from) => Some(Origin::open(game, from, experiment, new.skills.is_some(), setup.device)?),
+            None => None,
+        };
+        let skills = new.skills.or_else(|| origin.as_ref().and_then(Origin::skills));
         let Recorded { rollouts, seen } = if experiment.algorithm.trains_on_demos() {
             // Before the recordings are replayed, which takes longer than the trainer's own check.
             trainer::check(game, experiment)?;
@@ -180,11 +185,9 @@ impl Training {
             trainer.note_seen(seen);
         }
         let mut info = run_info(game, new, seen, setup)?;
-        if let Some(path) = new.init_from {
-            start_from(game, path, experiment, &mut trainer, &mut info)?;
-        }
+        let started = origin.map(|origin| origin.give(&mut trainer, &mut info)).transpose()?;
         let run = RunDir::create(new.path, &experiment.without_study(), &info, new.force)?;
-        Ok(Self { run, trainer })
+        Ok(Self { run, trainer, started })
     }
 
     /// Resumes a run from its last checkpoint. `experiment` is that of the run, or differs in its length or its
@@ -204,7 +207,7 @@ impl Training {
         if !trainer.is_done() && *experiment != saved {
             run.write_experiment(experiment)?;
         }
-        Ok(Self { run, trainer })
+        Ok(Self { run, trainer, started: None })
     }
 
     /// Trains to the end of the experiment or until the observer stops it, with log and checkpoints. Returns whether
@@ -228,7 +231,7 @@ impl Training {
         observer: &mut dyn RunObserver,
         after: &mut dyn FnMut(&Trainer, &UpdateReport) -> Result<(), E>,
     ) -> Result<bool, E> {
-        let Self { run, trainer } = self;
+        let Self { run, trainer, .. } = self;
         trainer.report_panics_to(run.path());
         let (steps_per_update, every) =
             (trainer.experiment().steps_per_update(), trainer.experiment().checkpoints.every);
@@ -258,47 +261,6 @@ impl Training {
     }
 }
 
-/// Gives a new run the weights of another one, and notes it with the levels that the other one has seen.
-fn start_from(
-    game: &dyn Game,
-    path: &Path,
-    experiment: &Experiment,
-    trainer: &mut Trainer,
-    info: &mut RunInfo,
-) -> Result<(), TrainingError> {
-    let OpenedRun { run, experiment: theirs, info: other } = RunDir::open(path)?;
-    let refuse = |why: String| Err(TrainingError::BadStart { run: path.to_owned(), why });
-    if theirs.game != experiment.game || other.game_version != info.game_version {
-        let (game, version) = (&experiment.game, info.game_version);
-        return refuse(format!("it is of {} {}, and the new one of {game} {version}", theirs.game, other.game_version));
-    }
-    if other.algorithm != info.algorithm {
-        let (found, wanted) = (other.algorithm, info.algorithm);
-        return refuse(format!("it was trained by {found}, and the new one is by {wanted}: add --algorithm {found}"));
-    }
-    if other.skills != info.skills {
-        return refuse("its skill model is another one: name its own with --skills".to_owned());
-    }
-    if let Some(seen) = HeldOut::new(game, &experiment.test).shown_by(other.seen.as_ref()) {
-        return refuse(format!("it has learned from {seen}, and the new run holds out {} (`test`)", experiment.test));
-    }
-    let checkpoint = run.checkpoint(CheckpointChoice::Last)?;
-    trainer
-        .learner
-        .start_from(&checkpoint.learner_file())
-        .map_err(|error| TrainingError::BadStart { run: path.to_owned(), why: error.to_string() })?;
-    match &other.seen {
-        Some(seen) => {
-            trainer.note_seen(seen);
-            info.seen.iter_mut().for_each(|levels| levels.extend(seen));
-        }
-        // A run of an older version, whose levels are unknown.
-        None => (trainer.seen, info.seen) = (None, None),
-    }
-    info.begun_from = Some(BegunFrom { run: path.to_owned(), step: checkpoint.summary.step });
-    Ok(())
-}
-
 /// Returns the metadata of a new run. `recorded` are the levels of the recordings that it trains on.
 ///
 /// # Errors
@@ -312,7 +274,7 @@ pub(crate) fn run_info(
 ) -> Result<RunInfo, RunError> {
     let experiment = new.experiment;
     let skill_file = new.skill_file.filter(|_| experiment.algorithm.needs_skills());
-    let mut seen = experiment.algorithm.is_trained().then(|| seen_by_training(game, &experiment.train));
+    let mut seen = experiment.algorithm.has_checkpoints().then(|| seen_by_training(game, &experiment.train));
     if let Some(recorded) = new.skills.and_then(SkillModel::demos).cloned().or(recorded) {
         seen.get_or_insert_with(|| recorded.clone()).extend(&recorded);
     }
@@ -325,6 +287,7 @@ pub(crate) fn run_info(
         skills: skill_file.map(file_checksum).transpose()?,
         seen,
         begun_from: None,
+        observed: if experiment.observation_config().is_image() { Vec::new() } else { game.observation().names },
         device: setup.device,
     })
 }

@@ -522,7 +522,7 @@ impl TrainedLearner {
         }
         let model = || fitting(game, experiment, skills);
         Ok(match algorithm {
-            Algorithm::BehaviourCloning => return Err(TrainError::NotTrained(algorithm)),
+            Algorithm::BehaviourCloning | Algorithm::Imitation => return Err(TrainError::NotTrained(algorithm)),
             Algorithm::Ppo => Self::of(PpoLearner::new(ppo, spec, seed, device)?),
             Algorithm::Sac => Self::of(SacLearner::new(sac, spec, seed, device)?),
             Algorithm::Rlpd => Self::of(SacLearner::with_demos(sac, &experiment.rlpd, demos, spec, seed, device)?),

@@ -58,7 +58,7 @@ fn is_missing(error: &FileError) -> bool {
 ///
 /// There is none. For behaviour cloning, which trains nothing, the error names the skill model to use instead.
 pub(crate) fn checkpoint(run: &RunDir, algorithm: Algorithm, choice: CheckpointChoice) -> Result<Checkpoint, CliError> {
-    if !algorithm.is_trained() {
+    if !algorithm.has_checkpoints() {
         return Err(untrained(run.path(), algorithm));
     }
     let checkpoint = run.checkpoint(choice)?;

@@ -266,7 +266,7 @@ fn train_one(
     let skills = algorithm.needs_skills().then_some(skills);
     let (folder, skill_file) = (args.run.join(algorithm.name()), args.run.join(SKILLS));
     let skill_file = Some(skill_file.as_path());
-    let new = NewRun { path: &folder, experiment: &experiment, skills, skill_file, init_from: None, force: true };
+    let new = NewRun { path: &folder, experiment: &experiment, skills, skill_file, from: None, force: true };
     let mut curve = Vec::new();
     let mut console = Console::new(format!("train {algorithm}")).on_update(|report| {
         if let Some(kl) = report.initial_kl {
@@ -285,7 +285,7 @@ fn train_one(
     let start = Instant::now();
     let finished = training.drive(&mut console)?;
     drop(console);
-    let Training { run, trainer } = training;
+    let Training { run, trainer, .. } = training;
     let steps_per_s = trainer.steps() as f64 / start.elapsed().as_secs_f64();
     let player = Player::Policy { policy: trainer.policy(), prior: trainer.skill_prior(), draw };
     let settled = RunCurves::read(run.path())?;

@@ -142,7 +142,7 @@ fn table() -> PlainTable {
 fn row(run: &RunRecord) -> Vec<String> {
     let known = |value: Option<f64>, words: fn(f64) -> String| value.map_or(UNKNOWN.to_owned(), words);
     let state = match (run.is_finished(), run.checkpoints.is_empty()) {
-        _ if !run.info.algorithm.is_trained() => "nothing to train",
+        _ if !run.info.algorithm.has_checkpoints() => "nothing to train",
         (false, _) if run.is_training => "training",
         (true, false) => "finished",
         (true, true) => "finished, no checkpoint",

@@ -27,6 +27,8 @@ use playbot_learner::{SeenLevels, SkillModel};
 use playbot_report::{counted, whole};
 use playbot_train::{
     Algorithm, Experiment, LearnerKind, TrainError,
+    begin_from::{BeginFrom, Started},
+    checkpoint::CheckpointChoice,
     run_dir::{OpenedRun, RunDir},
     train_run::{NewRun, Training, TrainingError, TrainingSetup, goes_on_from, never_learns, rounded},
 };
@@ -38,7 +40,7 @@ use std::path::{Path, PathBuf};
   playbot train GAME --skills skills.safetensors --run runs/first
   playbot train --algorithm ppo --run runs/baseline --steps 200000
   playbot train --skills skills.safetensors --run runs/weak --set score.kl_coef=0.01 --set ppo.lr=0.0003
-  playbot train --algorithm ppo --init-from runs/baseline --run runs/slow --set ppo.lr=0.0001
+  playbot train --algorithm ppo --from runs/baseline --run runs/slow --set ppo.lr=0.0001
   playbot train --run runs/first --resume
   playbot train --run runs/first --resume --steps 1000000")]
 pub struct Args {
@@ -58,10 +60,17 @@ pub struct Args {
     /// values, --steps and --checkpoint-every with new ones.
     #[arg(long)]
     resume: bool,
-    /// Begin with the weights and normalisers of another run's last checkpoint. Algorithm, skills and networks must be
-    /// the same, other settings may differ. For ppo and score-ppo.
-    #[arg(long, value_name = "RUN", conflicts_with = "resume")]
-    init_from: Option<PathBuf>,
+    /// Begin with the weights, normalisers and skills of another run. Settings, levels and rewards may differ, and the
+    /// observation may have more values: they begin at weight 0. Layers that do not fit begin anew, and are listed. For
+    /// ppo, score-ppo and spirl-ppo; the others take skills only.
+    #[arg(long = "from", alias = "init-from", value_name = "RUN", conflicts_with = "resume")]
+    begin_from: Option<PathBuf>,
+    /// Checkpoint of the run of --from: last, best (highest return in training), or its number of environment steps.
+    #[arg(long, value_name = "CHECKPOINT", default_value = "last", requires = "begin_from")]
+    from_checkpoint: CheckpointChoice,
+    /// Go on with Adam's moments of the run of --from, too, instead of beginning them anew.
+    #[arg(long, requires = "begin_from")]
+    from_moments: bool,
     /// Delete the folder of the run first if it exists.
     #[arg(long, conflicts_with = "resume")]
     force: bool,
@@ -170,14 +179,16 @@ fn start(
     check_start_and_steps(game, &experiment.train.mode, experiment.train.first)?;
     interrupt::leave("nothing is trained yet".to_owned());
     let (path, skill_file) = (args.run.as_path(), args.skills.as_deref());
-    let (skills, init_from, force) = (skills.as_ref(), args.init_from.as_deref(), args.force);
-    let new = NewRun { path, experiment: &experiment, skills, skill_file, init_from, force };
+    let (skills, force) = (skills.as_ref(), args.force);
+    let (checkpoint, moments) = (args.from_checkpoint, args.from_moments);
+    let from = args.begin_from.as_deref().map(|run| BeginFrom { run, checkpoint, moments });
+    let new = NewRun { path, experiment: &experiment, skills, skill_file, from, force };
     let training = Training::begin(game, &new, setup, console).map_err(|error| match error {
         TrainingError::Train(error) => explain(*error, args, &experiment, games),
         other => other.into(),
     })?;
-    if let Some(from) = &args.init_from {
-        report!("beginning with the weights of {}", from.display());
+    if let (Some(from), Some(started)) = (&args.begin_from, &training.started) {
+        report_start(from, started);
     }
     if args.from.experiment.is_none() {
         report!(
@@ -189,6 +200,18 @@ fn start(
     let seen = training.trainer.seen();
     equal_layouts(game, &experiment.train, &experiment.test, seen).iter().for_each(|words| report!("{words}"));
     Ok(training)
+}
+
+/// Reports what a run takes from another one, and whether its first policy is the same.
+fn report_start(from: &Path, started: &Started) {
+    let skills = if started.has_skills { " and skills" } else { "" };
+    let Some(report) = &started.report else {
+        return report!("beginning with the skills of {}, and with a policy of its own", from.display());
+    };
+    report!("beginning with the weights{skills} of {}: {report}", from.display());
+    if report.is_same_policy {
+        report!("the first policy gives the same outputs as the old one, to the bit");
+    }
 }
 
 /// Largest number of levels of a range whose layouts are compared before a training, so that it begins at once.
@@ -275,6 +298,13 @@ fn resume(args: &Args, games: &Games, setup: &TrainingSetup<'_>) -> Result<Train
     let opened = RunDir::open_to_write(&args.run)?;
     let OpenedRun { experiment: saved, info, .. } = &opened;
     let game = games.of_file(Artifact::Run, &args.run, &saved.game)?;
+    if info.algorithm == Algorithm::Imitation {
+        let run = args.run.display();
+        return Err(CliError::Usage(format!(
+            "{run} is a run of imitation: go on with `playbot imitate --run {run} --resume`, or train its policy in a new run, \
+             `playbot train --algorithm ppo --from {run} --run NEW`"
+        )));
+    }
     if !info.algorithm.is_trained() {
         return Err(open::untrained(&args.run, info.algorithm));
     }

@@ -95,6 +95,8 @@ pub(super) struct Description {
     /// Prepares a level that can be played.
     pub(super) loaded: Option<SystemFactory<()>>,
     pub(super) demonstrator: Option<(&'static str, SystemFactory<ActionValue>)>,
+    /// The reason for which the demonstrator cannot be asked in states that it has not led to, if there is one.
+    pub(super) cannot_be_asked: Option<&'static str>,
     /// Scripted bots beside the demonstrator.
     pub(super) bots: Vec<(&'static str, SystemFactory<ActionValue>)>,
     pub(super) hash: Option<SystemFactory<u64>>,

@@ -16,6 +16,9 @@ const PPO: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO, Reader::SPIRL_PPO, Read
 
 /// Those of them that may be curious.
 const CURIOUS: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO];
+/// The algorithms whose networks its settings describe.
+const NETWORKS: &[Reader] =
+    &[Reader::SCORE_PPO, Reader::PPO, Reader::SPIRL_PPO, Reader::SPIRL_SAC_DECODER, Reader::IMITATION];
 
 /// Those of them whose policy is over actions.
 const OVER_ACTIONS: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO, Reader::SPIRL_PPO_DECODER, Reader::SPIRL_SAC_DECODER];
@@ -69,17 +72,17 @@ settings! {
     /// True if actor and critic normalise observations by running statistics of their own. It cannot be combined with
     /// a copied decoder, whose observations are raw or, by `skills.norm_obs`, normalised by frozen statistics. Not
     /// for images, whose pixels are divided by 255.
-    norm_obs: bool = false;
+    norm_obs: bool = false, by NETWORKS;
     /// The memory of actor and critic. A policy that starts as a copy of the decoder has one that is without effect at
     /// first. `sequence` ticks are trained together, and `burn_in` is explained with them.
     memory: MemoryKind = MemoryKind::None, in Range::COUNT, by REMEMBER, such as "Gru(hidden: 128)", off "settings::is_off";
     /// Hidden layers of actor and critic. A copied decoder brings its own.
-    hidden: Vec<usize> = vec![200, 200], in Range::COUNT;
+    hidden: Vec<usize> = vec![200, 200], in Range::COUNT, by NETWORKS;
     /// The function after each hidden layer.
-    activation: Activation = Activation::Relu;
+    activation: Activation = Activation::Relu, by NETWORKS;
     /// The convolutions over images, which actor and critic share. A copied decoder brings its own. Not used for
     /// vectors.
-    cnn: CnnKind = CnnKind::default(), in Range::COUNT;
+    cnn: CnnKind = CnnKind::default(), in Range::COUNT, by NETWORKS;
     /// ε of Adam.
     adam_eps: f64 = 1e-5, in Range::Positive(1.0);
     /// Decoupled weight decay of Adam: a weight loses lr · weight_decay of itself in each step.

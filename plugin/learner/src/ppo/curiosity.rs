@@ -140,11 +140,11 @@ impl Rnd {
 
     /// Takes over what another run has learned to predict. The optimiser stays new, and so do the returns of its
     /// environments.
-    pub(super) fn take_over(&mut self, other: Self) {
-        self.target = other.target;
+    pub(super) fn take_over(&mut self, other: &Self) {
+        self.target = other.target.clone();
         self.predictor = tracked(&other.predictor);
-        self.observations = other.observations;
-        self.rewards.stats = other.rewards.stats;
+        self.observations = other.observations.clone();
+        self.rewards.stats = other.rewards.stats.clone();
     }
 
     /// Rewards what is new in a rollout, and then trains the predictor on a share of it.

@@ -36,7 +36,7 @@ pub(crate) struct Teacher {
     pub(crate) config: ScoreConfig,
     pub(crate) tied_to: TiedTo,
     pub(crate) description: SkillDescription,
-    actors: Actors,
+    pub(crate) actors: Actors,
     /// Frozen normalisation of observations for decoder, prior and the policy that is tied to them.
     pub(crate) stats: Option<Arc<ObsStats>>,
 }

@@ -23,7 +23,7 @@ pub struct DatasetEpisode {
 pub struct Dataset {
     pub(super) observation: ObsKind,
     pub(super) space: ActionSpace,
-    pub(super) episodes: Arc<[Arc<DatasetEpisode>]>,
+    pub(crate) episodes: Arc<[Arc<DatasetEpisode>]>,
     /// The level of each episode.
     pub(super) levels: Arc<[usize]>,
     /// The same episodes as vectors of the game's state, if they are known.
@@ -31,7 +31,7 @@ pub struct Dataset {
     /// The levels that they show, if known.
     pub(super) seen: Option<Arc<SeenLevels>>,
     /// The masks of each episode; empty if every action was always legal.
-    pub(super) legal: Arc<[Arc<[bool]>]>,
+    pub(crate) legal: Arc<[Arc<[bool]>]>,
     /// Episodes whose masks are not known.
     pub(super) unmasked: usize,
 }
@@ -95,6 +95,11 @@ impl Dataset {
     /// Returns whether an action was illegal in some step.
     pub fn has_masks(&self) -> bool {
         !self.legal.is_empty()
+    }
+
+    /// Returns the levels that they show, if known.
+    pub fn seen(&self) -> Option<&SeenLevels> {
+        self.seen.as_deref()
     }
 
     /// Returns the number of episodes whose masks are not known.

@@ -3,7 +3,7 @@
 use crate::corridor::config;
 use crate::score::model;
 use crate::toy::{Driver, OBS, SPACE};
-use playbot_learner::{DeviceKind, Learner, PolicySpec, PpoConfig, PpoLearner, ScoreConfig};
+use playbot_learner::{DeviceKind, Learner, PolicySpec, PpoConfig, PpoLearner, ScoreConfig, StartFrom};
 
 fn learners() -> Vec<PpoLearner> {
     let spec = PolicySpec { obs: OBS.into(), latent: 0, action_space: SPACE };
@@ -56,14 +56,15 @@ fn a_learner_starts_from_the_weights_of_another_run_with_its_own_settings() {
     let mut second = new(PpoConfig { norm_obs: true, lr: 0.004, ..config() }, 6);
     let values = |learner: &PpoLearner| Driver::new(4, 1).rollout(learner, 16).values;
     assert_ne!(values(&second), values(&first));
-    second.start_from(&path).expect("the same networks");
+    let report = second.start_from(&StartFrom::new(&path)).expect("the same networks");
+    assert!(report.is_same_policy && report.anew.is_empty(), "{report}");
     assert_eq!(values(&second), values(&first));
     assert_eq!((second.updates(), second.config().lr), (0, 0.004));
-    let raw = new(config(), 6).start_from(&path).expect_err("without a normaliser").to_string();
+    let raw = new(config(), 6).start_from(&StartFrom::new(&path)).expect_err("without a normaliser").to_string();
     assert!(raw.contains("it has another `ppo.norm_obs` than the new run"), "{raw}");
     let wide = PpoConfig { hidden: vec![3], norm_obs: true, ..config() };
-    let wide = new(wide, 6).start_from(&path).expect_err("other layers").to_string();
-    assert!(wide.contains("it has other hidden layers or convolutions than the new run"), "{wide}");
+    let wide = new(wide, 6).start_from(&StartFrom::new(&path)).expect_err("other layers").to_string();
+    assert!(wide.contains("no layer of its policy fits: its hidden layers are"), "{wide}");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 #![allow(clippy::disallowed_methods, reason = "tests compare with the system's functions")]
 
 mod augmentation;
+mod begin_from;
 mod checkpoint;
 mod clock;
 mod corridor;

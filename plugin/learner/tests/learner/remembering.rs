@@ -6,7 +6,7 @@ use crate::toy::{OBS, SPACE};
 use playbot_learner::rng::{ChaCha8Rng, Streams, unit};
 use playbot_learner::{
     ActionSpace, ActionValue, Actions, DeviceKind, Learner, MemoryKind, Policy, PolicyFile, PolicyMetadata, PolicySpec,
-    PpoConfig, PpoLearner, Rollout, RolloutStep, ScoreConfig, SkillModel,
+    PpoConfig, PpoLearner, Rollout, RolloutStep, ScoreConfig, SkillModel, StartFrom,
 };
 
 /// Ticks from the cue to the junction.
@@ -200,7 +200,7 @@ fn what_is_learned_from_is_what_was_remembered_in_play() {
         let still = PpoConfig { lr: 1e-30, ..learner.config().clone() };
         let spec = learner.spec();
         let mut learner = PpoLearner::new(still, spec, 1, DeviceKind::Flex).expect("good settings");
-        learner.start_from(&path).expect("the same networks");
+        learner.start_from(&StartFrom::new(&path)).expect("the same networks");
         let metrics = learner.update(&driver.rollout(&learner.policy(), 48)).expect("finite");
         assert!(metrics.approx_kl.abs() < 1e-6 && metrics.clip_fraction == 0.0, "{memory:?}: {metrics:?}");
         // With states that are not those of play it would not be so.
@@ -307,4 +307,59 @@ fn a_rollout_without_what_was_remembered_is_refused() {
     let image = playbot_learner::ImageShape { channels: 3, height: 64, width: 64 };
     let text = config.check_observation(&image.into()).expect_err("pictures").to_string();
     assert!(text.contains("image.stack"), "{text}");
+}
+
+#[test]
+fn a_policy_that_has_no_memory_can_get_one_and_stays_the_same() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("checkpoint.safetensors");
+    let mut plain = learner(MemoryKind::None, 5);
+    plain.update(&Driver::new(4, 1).rollout(&plain.policy(), 16)).expect("finite");
+    plain.save(&path).expect("written");
+    let obs = [0.4, -0.2, 1.0];
+    let expected = plain.policy().forward(&[], &obs, 1).expect("finite");
+    for memory in [gru(8, 0), MemoryKind::Stack { ticks: 3 }] {
+        let mut learner = learner(memory, 6);
+        let report = learner.start_from(&StartFrom { moments: true, ..StartFrom::new(&path) }).expect("it fits");
+        assert!(report.is_same_policy && report.taken.contains(&"actor.head".to_owned()), "{report}");
+        let memory = vec![0.7; learner.policy().memory()];
+        let found = learner.policy().forward_remembering(&[], &[], &memory, &obs, 1).expect("finite");
+        assert_eq!((found.head, found.values), (expected.head.clone(), expected.values.clone()), "{report}");
+        learner.update(&Driver::new(4, 1).rollout(&learner.policy(), 16)).expect("it learns on");
+    }
+}
+
+#[test]
+fn what_remembers_is_not_widened() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("checkpoint.safetensors");
+    learner(gru(8, 0), 5).save(&path).expect("written");
+    let refused = |memory, width: usize| {
+        let config = PpoConfig { num_steps: 48, norm_reward: false, memory, ..corridor::config() };
+        let spec = PolicySpec { obs: width.into(), latent: 0, action_space: ActionSpace::Discrete(2) };
+        let mut learner = PpoLearner::new(config, spec, 1, DeviceKind::Flex).expect("good settings");
+        learner.start_from(&StartFrom::new(&path)).expect_err("it does not fit").to_string()
+    };
+    assert!(refused(gru(8, 0), WIDTH + 1).contains("of fewer inputs"));
+    assert!(refused(MemoryKind::None, WIDTH).contains("another `ppo.memory`"));
+    assert!(refused(MemoryKind::Gru { hidden: 4, sequence: 8, burn_in: 0 }, WIDTH).contains("another `ppo.memory`"));
+}
+
+#[test]
+fn a_curious_policy_remembers_too() {
+    let curiosity = ron::from_str("Rnd()").expect("all of it has defaults");
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("checkpoint.safetensors");
+    let config = PpoConfig { curiosity, memory: gru(8, 2), hidden: vec![16], ..PpoConfig::default() };
+    let spec = PolicySpec { obs: WIDTH.into(), latent: 0, action_space: ActionSpace::Discrete(2) };
+    let mut learner = PpoLearner::new(config, spec, 1, DeviceKind::Flex).expect("good settings");
+    let mut driver = Driver::new(4, 1);
+    learner.update(&driver.rollout(&learner.policy(), 32)).expect("finite");
+    learner.save(&path).expect("written");
+    let mut loaded = PpoLearner::load(&path, DeviceKind::Flex).expect("read");
+    let rollout = driver.rollout(&learner.policy(), 32);
+    assert_eq!(loaded.update(&rollout).expect("finite"), learner.update(&rollout).expect("finite"));
+    let forgotten = playbot_learner::Rollout { memory: vec![0.0; rollout.memory.len()], ..rollout.clone() };
+    let mut again = PpoLearner::load(&path, DeviceKind::Flex).expect("read");
+    assert_ne!(again.update(&forgotten).expect("finite"), loaded.update(&rollout).expect("finite"));
 }

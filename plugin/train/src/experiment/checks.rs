@@ -38,8 +38,13 @@ impl Experiment {
         if self.train.overlaps(&self.test) && !may_be_only {
             return Err(ExperimentError::Overlap { train: self.train.clone(), test: self.test.clone() });
         }
-        let own =
-            [self.check_ranges(), self.eval.check_ranges(), self.checkpoints.check_ranges(), self.study.check_ranges()];
+        let own = [
+            self.check_ranges(),
+            self.eval.check_ranges(),
+            self.imitation.check_ranges(),
+            self.checkpoints.check_ranges(),
+            self.study.check_ranges(),
+        ];
         own.into_iter().collect::<Result<(), _>>().map_err(out_of_range)?;
         let of_image =
             |error| ExperimentError::Settings { key: Some("image".to_owned()), words: format!("`image`: {error}") };

@@ -292,6 +292,7 @@ mod tests {
             skills: None,
             seen: None,
             begun_from: None,
+            observed: Vec::new(),
             device: DeviceKind::Flex,
         };
         let path = format!("{algorithm}-{seed}").into();

@@ -11,9 +11,9 @@ use playbot_harness::games::Games;
 use playbot_report::{Chart, Curve, PlainTable, counted, readable, sparkline, to_svg, whole};
 use playbot_train::{
     Experiment,
+    ancestor::Ancestor,
     checkpoint::{Checkpoint, CheckpointSummary},
     metrics_log::{EPISODIC_RETURN, SUCCESS_RATE, range_of},
-    run_dir::BegunFrom,
     runs::{RunCurves, RunRecord, changed_settings, with_defaults},
 };
 use serde_json::{Value, json};
@@ -91,8 +91,8 @@ fn print_head(run: &RunRecord, games: &Games) -> Result<(), CliError> {
         info.device,
         info.skills.as_ref().map_or(String::new(), |skills| format!(", skill model {skills}"))
     ))?;
-    if let Some(BegunFrom { run, step }) = &info.begun_from {
-        print_line(format!("begun with the weights of {} at step {}", run.display(), whole(*step as f64)))?;
+    for (place, ancestor) in info.begun_from.iter().flat_map(Ancestor::chain).enumerate() {
+        print_line(describe_ancestor(ancestor, place == 0))?;
     }
     let state = match (run.is_finished(), run.is_training) {
         (true, _) => "finished",
@@ -120,6 +120,24 @@ fn print_head(run: &RunRecord, games: &Games) -> Result<(), CliError> {
         print_line(format!("checkpoint: {} ({value})", path.display()))?;
     }
     print_line("")
+}
+
+/// Describes the run that a run began with, or, not being `first`, that its ancestor began with.
+fn describe_ancestor(ancestor: &Ancestor, first: bool) -> String {
+    let Ancestor { run, step, algorithm, checksum, taken, anew, new_inputs, .. } = ancestor;
+    let what = if taken.is_empty() && algorithm.is_some() { "skills" } else { "weights" };
+    let begun = if first { "begun with" } else { "which began with" };
+    let mut text = format!("{begun} the {what} of {} at step {}", run.display(), whole(*step as f64));
+    if let (Some(algorithm), Some(checksum)) = (algorithm, checksum) {
+        text += &format!(" ({algorithm}, checksum {checksum})");
+    }
+    if *new_inputs > 0 {
+        text += &format!(", with {} at weight 0", counted(*new_inputs as u64, "new input"));
+    }
+    if !anew.is_empty() {
+        text += &format!(", anew: {}", anew.join(", "));
+    }
+    text
 }
 
 /// Describes the rating of a checkpoint in training. Before the 100th episode has ended only the log has it.

@@ -39,7 +39,7 @@ pub(super) fn resumed(args: &Args, saved: &Experiment, info: &RunInfo, games: &G
     }
     Err(CliError::Usage(format!(
         "{} is resumed with other settings: {}; drop the option, or start a new run with another --run, \
-         without --resume, and with --init-from {} to begin with the weights of this one (--steps and --checkpoint-every \
+         without --resume, and with --from {} to begin with the weights of this one (--steps and --checkpoint-every \
          may change)",
         args.run.display(),
         in_words(differences),
@@ -108,6 +108,7 @@ mod tests {
             skills: None,
             seen: None,
             begun_from: None,
+            observed: Vec::new(),
             device,
         };
         let words = ["train", "--run", "runs/first", "--resume"].into_iter().chain(options.iter().copied());
@@ -164,7 +165,7 @@ mod tests {
             assert!(
                 text.starts_with("runs/first is resumed with other settings")
                     && text.contains("another --run")
-                    && text.contains("--init-from runs/first to begin"),
+                    && text.contains("--from runs/first to begin"),
                 "{text}"
             );
         }
