@@ -95,6 +95,7 @@ fn mistakes_are_reported_before_anything_is_explored() {
         (&["ant", "--level", "chase:0", "--png", "x.png"], "leave --png out, or add one to its adapter with `.plan`"),
         (&["coinrun", "--force"], "--out <FILE>"),
         (&["coinrun", "--cell", "a", "--out", "a.demo"], "`a` is not a cell"),
+        (&["coinrun", "--beside", "none"], "none"),
         (&["coinrn"], "did you mean `coinrun`?"),
     ] {
         let output = playbot(folder, &[&["explore"], args].concat());
@@ -103,4 +104,43 @@ fn mistakes_are_reported_before_anything_is_explored() {
         assert!(output.stdout.is_empty(), "{args:?}");
     }
     assert_eq!(fs::read_dir(folder).expect("a folder").count(), 0, "nothing is left behind");
+}
+
+#[test]
+fn a_policy_is_played_beside_an_exploration_for_as_many_ticks() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    let levels = "random+size=7x7+sparse+end-at-goal:3..3";
+    let settings = ["--set", "arenas=4", "--set", "ppo.num_steps=64", "--set", "ppo.curiosity=Rnd(hidden: [16])"];
+    let train = ["train", "maze2d", "--algorithm", "ppo", "--run", "runs/curious", "--steps", "2048"];
+    let test_levels = "test=random+size=7x7+sparse+end-at-goal:40..41";
+    done(folder, &[&train[..], &settings, &["--set", &format!("train={levels}"), "--set", test_levels]].concat());
+    let explore = ["explore", "maze2d", "--level", "random+size=7x7+sparse+end-at-goal:3", "--steps", "20000"];
+    let beside = |more: &[&str]| ended(folder, &[&explore[..], &["--until", "spent"], more].concat(), 0);
+    let (alone, _) = beside(&["--json"]);
+    let (both, reported) = beside(&["--json", "--beside", "runs/curious", "--png", "both.png"]);
+    assert!(reported.contains("drawn: both.png"), "{reported}");
+    let (mut found, alone) = (json_lines(&both).remove(0), json_lines(&alone).remove(0));
+    let played = found.as_object_mut().and_then(|found| found.remove("beside")).expect("it was played");
+    assert_eq!(found, alone, "the exploration stays the same");
+    assert_eq!(played["player"], "runs/curious");
+    let number = |name: &str| played["cells"][name].as_u64().expect("a number");
+    assert_eq!(Some(number("ticks")), found["steps"].as_u64());
+    assert!(number("episodes") > 1 && number("open_cells_reached") >= 1, "{played}");
+    assert_eq!(number("both") + number("only_player"), number("cells"));
+    assert_eq!(Some(number("both") + number("only_explorer")), found["cells"].as_u64());
+    let (again, _) = beside(&["--json", "--beside", "runs/curious", "--threads", "1"]);
+    assert_eq!(json_lines(&again), json_lines(&both), "threads change nothing");
+    let (words, _) = beside(&["--beside", "runs/curious"]);
+    assert!(words.contains("beside    runs/curious: "), "{words}");
+    let size = |name: &str| {
+        let png = fs::read(folder.join(name)).expect("drawn");
+        // The width is in bytes 16 to 19 of a PNG.
+        u32::from_be_bytes([png[16], png[17], png[18], png[19]])
+    };
+    beside(&["--png", "one.png"]);
+    assert!(size("both.png") > size("one.png") * 3 / 2, "both are drawn");
+    let mistaken = playbot(folder, &["explore", "coinrun", "--beside", "runs/curious"]);
+    assert_eq!((code(&mistaken), mistaken.stdout.is_empty()), (3, true), "{}", errors(&mistaken));
+    assert!(errors(&mistaken).contains("a run of the game `maze2d`, not of `coinrun`"), "{}", errors(&mistaken));
 }

@@ -88,9 +88,29 @@ impl Drawing {
         }
         svg + "</svg>\n"
     }
+
+    /// Puts another drawing to the right of this one.
+    #[must_use]
+    pub fn beside(mut self, other: Self) -> Self {
+        let by = Vec2::new(self.size.x, 0.0);
+        self.shapes.extend(other.shapes.into_iter().map(|shape| shape.moved(by)));
+        let label = format!("{}; {}", self.label, other.label);
+        Self { label, size: Vec2::new(by.x + other.size.x, self.size.y.max(other.size.y)), shapes: self.shapes }
+    }
 }
 
 impl Shape {
+    /// Moves it by so many pixels.
+    fn moved(mut self, by: Vec2) -> Self {
+        match &mut self {
+            Self::Block { area, .. } => *area = Rect::from_corners(area.min + by, area.max + by),
+            Self::Line { points, .. } => points.iter_mut().for_each(|point| *point += by),
+            Self::Mark { centre, .. } => *centre += by,
+            Self::Text { at, .. } => *at += by,
+        }
+        self
+    }
+
     fn write(&self, out: &mut String) {
         // Writing into a string cannot fail.
         let _ = match self {

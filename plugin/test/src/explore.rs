@@ -36,10 +36,12 @@
 //! - `known_paths`: the paths to cells, their replay, and the summary.
 //! - `snapshots`: snapshots on these paths.
 //! - `tried`: the actions that were tried from each cell.
+//! - `played`: the cells that a player reaches in episodes of its own.
 
 mod archive;
 mod cell;
 mod known_paths;
+mod played;
 pub mod round;
 mod snapshots;
 mod tried;
@@ -55,7 +57,7 @@ use bevy_playbot::{
     unknown_name::UnknownName,
     vision::{ObservationConfig, VisionError},
 };
-use playbot_harness::{game::Game, mode::ModeError, parallel::default_threads, split::LevelSplit};
+use playbot_harness::{eval::EvalError, game::Game, mode::ModeError, parallel::default_threads, split::LevelSplit};
 use playbot_learner::{HasExitCode, Policy};
 use serde::Serialize;
 use std::{
@@ -70,6 +72,7 @@ pub use crate::explore::{
     archive::ReachedCell,
     cell::{CellGrid, ExploredCell, NoCell},
     known_paths::{ExplorationSummary, Route, follow_route, record_route},
+    played::{PlayedCells, PlayedSummary},
     round::{Round, check_cell, explore, explore_until, open_cells},
     snapshots::SnapshotFault,
     tried::Exhaustion,
@@ -403,6 +406,9 @@ pub enum ExploreError {
         /// The first difference from the known path.
         divergence: Divergence,
     },
+    /// A player's own episodes could not be played.
+    #[error(transparent)]
+    Played(#[from] EvalError),
     /// A path could not be recorded.
     #[error(transparent)]
     Demo(#[from] DemoFileError),
@@ -414,6 +420,7 @@ impl HasExitCode for ExploreError {
             // The game is at fault, and the message says what to do.
             Self::Fault(_) | Self::Diverged { .. } => 2,
             Self::Demo(error) => error.exit_code(),
+            Self::Played(error) => error.exit_code(),
             Self::Plan(_) | Self::Mode(_) | Self::Vision(_) => 3,
         }
     }

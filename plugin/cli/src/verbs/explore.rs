@@ -1,7 +1,9 @@
 //! `playbot explore`.
 //!
 //! - `recorded`: recording of a path that was found.
+//! - `beside`: a policy's cells beside those of the exploration.
 
+mod beside;
 mod recorded;
 
 use crate::{
@@ -18,7 +20,10 @@ use crate::{
     pictures::plot::{PlotFile, without_plan},
     progress,
     progress::interrupt,
-    verbs::explore::recorded::{RecordingFile, chart},
+    verbs::explore::{
+        beside::{Beside, PlayedBeside},
+        recorded::{RecordingFile, chart},
+    },
 };
 use bevy_playbot::{placement::TickPlacement, policy::ActionDraw, skill_prior::SkillPrior, vision::ObservationConfig};
 use playbot_harness::{
@@ -54,7 +59,8 @@ use std::{
   playbot explore GAME --level MODE:7 --steps 1000000 --png reached.png
   playbot explore GAME --level MODE:7 --until solved --out solution.demo
   playbot explore GAME --level MODE:7 --skills skills.safetensors --json
-  playbot explore GAME --level MODE:7 --until spent --cell 3,4 --out there.demo")]
+  playbot explore GAME --level MODE:7 --until spent --cell 3,4 --out there.demo
+  playbot explore GAME --level MODE:7 --beside runs/curious --png both.png")]
 pub struct Args {
     /// Name of the game.
     game: String,
@@ -106,6 +112,10 @@ pub struct Args {
     /// Record and draw the path to this cell instead of the solution. Cells are named by their numbers, such as 3,4.
     #[arg(long, value_name = "CELL", allow_hyphen_values = true)]
     cell: Option<ExploredCell>,
+    /// Run, or policy file: also play its policy from the start of the level, for as many ticks as the exploration took,
+    /// and count the cells that it reaches. With --png they are drawn beside those of the explorer.
+    #[arg(long, value_name = "RUN")]
+    beside: Option<PathBuf>,
     /// Overwrite an existing recording.
     #[arg(long, requires = "out")]
     force: bool,
@@ -135,6 +145,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     {
         report!("warning: by the level's plan, cell {cell} is a wall, or walls cut it off from the start");
     }
+    let beside = args.beside.as_deref().map(|path| Beside::load(path, game, device)).transpose()?;
     let recording = args.out.as_deref().map(|path| RecordingFile::new(path, args.force)).transpose()?;
     let floor = match &args.png {
         None => None,
@@ -162,7 +173,12 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         );
     }
     let to_cell = args.cell.as_ref().map(|cell| (cell, exploration.route_to(cell)));
-    print(&exploration.summary(game), to_cell.as_ref(), args.json)?;
+    // What was explored is printed and kept, even if nothing can be set beside it.
+    let (played, beside_fault) = match beside.as_ref().map(|beside| beside.play(game, &exploration)).transpose() {
+        Ok(played) => (played, None),
+        Err(error) => (None, Some(error)),
+    };
+    print(&exploration.summary(game), to_cell.as_ref(), played.as_ref(), args.json)?;
     let is_missed = matches!(to_cell, Some((_, None)));
     let route = match to_cell {
         Some((_, route)) => route,
@@ -180,8 +196,15 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         }
     }
     if let Some((file, floor_plan)) = floor {
-        file.write(&chart(game, floor_plan, &exploration, route.as_ref())?.draw())?;
+        let drawing = chart(game, floor_plan.clone(), &exploration, route.as_ref())?.draw();
+        file.write(&match &played {
+            Some(played) => played.draw_beside(drawing, floor_plan, &exploration),
+            None => drawing,
+        })?;
         report!("drawn: {}", file.path().display());
+    }
+    if let Some(error) = beside_fault {
+        return Err(error);
     }
     Ok(match (exploration.stop, exploration.solution_ticks()) {
         (Stop::Asked, _) => Outcome::Stopped,
@@ -191,10 +214,11 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     })
 }
 
-/// Prints the result, and for the cell of `--cell` how soon it is reached.
+/// Prints the result, for the cell of `--cell` how soon it is reached, and the cells of the policy of `--beside`.
 fn print(
     summary: &ExplorationSummary,
     to_cell: Option<&(&ExploredCell, Option<Route>)>,
+    played: Option<&PlayedBeside<'_>>,
     as_json: bool,
 ) -> Result<(), CliError> {
     let ticks = to_cell.map(|(cell, route)| (cell, route.as_ref().map(|route| route.len())));
@@ -204,9 +228,15 @@ fn print(
         if let Some((cell, ticks)) = ticks {
             line["cell"] = json!({ "cell": cell.to_string(), "ticks": ticks });
         }
+        if let Some(played) = played {
+            line["beside"] = played.json()?;
+        }
         return print_line(line);
     }
     print_line(summary)?;
+    if let Some(played) = played {
+        print_line(played.line())?;
+    }
     match ticks {
         None => Ok(()),
         Some((cell, Some(ticks))) => print_line(format!("cell {cell} is reached in {}", counted(ticks as u64, "tick"))),

@@ -16,9 +16,9 @@ const SPACE: ActionSpace = ActionSpace::Discrete(3);
 /// Steps until an episode is cut off.
 const LIMIT: usize = 60;
 
-/// Several locks. One of three actions leads on, the others lead back to the place before. Only an open lock pays.
+/// Several locks. One of three actions leads on, the others lead back to the first place. Only an open lock pays.
 ///
-/// A player at random opens one in 40,000 episodes.
+/// A player at random opens one in 3^13 tries.
 struct Locks {
     /// Place and time of each.
     states: Vec<(usize, usize)>,
@@ -50,7 +50,7 @@ impl Locks {
                 let (action, log_prob) = output.sample(row, rng);
                 let (place, time) = &mut self.states[row];
                 let is_right = action == ActionValue::Discrete((*place * *place % 3) as u32);
-                *place = if is_right { *place + 1 } else { place.saturating_sub(1) };
+                *place = if is_right { *place + 1 } else { 0 };
                 *time += 1;
                 let is_open = *place == PLACES - 1;
                 self.farthest = self.farthest.max(*place);
@@ -78,15 +78,12 @@ fn curious(config: PpoConfig) -> PpoConfig {
     PpoConfig { curiosity: Curiosity::rnd(), ..config }
 }
 
-/// Returns the locks opened in the last tenth of a training, and the farthest place that was reached in all of it.
+/// Returns the locks that were opened in a training, and the farthest place that was reached.
 fn trained(config: PpoConfig, seed: u64) -> (usize, usize) {
     let spec = PolicySpec { obs: PLACES.into(), latent: 0, action_space: SPACE };
     let mut learner = PpoLearner::new(config, spec, seed, DeviceKind::Flex).expect("good settings");
     let mut locks = Locks::new(seed);
-    for update in 0..100 {
-        if update == 90 {
-            locks.opened = 0;
-        }
+    for _ in 0..50 {
         let rollout = locks.rollout(&learner.policy(), 32);
         learner.update(&rollout).expect("finite");
     }
@@ -99,7 +96,7 @@ fn a_curious_player_opens_a_lock_that_pays_at_the_end_only_and_another_does_not(
         let (plain, reached) = trained(config(), seed);
         assert!(plain == 0 && reached < PLACES - 1, "seed {seed}: PPO alone got to {reached} and opened {plain}");
         let (opened, reached) = trained(curious(config()), seed);
-        assert!(opened > 100, "seed {seed}: a curious player got to {reached} and opened {opened}");
+        assert!(opened > 500, "seed {seed}: a curious player got to {reached} and opened {opened}");
     }
 }
 

@@ -17,8 +17,8 @@ use playbot_harness::{
     worlds::Arrangement,
 };
 use playbot_learner::{
-    ActionSpace, Augmentation, HasExitCode, ImageShape, LearnError, ObsKind, PriorKind, SettingError, SkillDraw,
-    TimeLimit, nn::CnnKind, settings::Settings,
+    ActionSpace, Augmentation, Curiosity, HasExitCode, ImageShape, LearnError, ObsKind, PriorKind, SettingError,
+    SkillDraw, TimeLimit, nn::CnnKind, settings::Settings,
 };
 use std::path::Path;
 use thiserror::Error;
@@ -456,7 +456,19 @@ impl Experiment {
         let rows = product(&[u64::from(self.arenas), self.ppo.num_steps as u64]) / (self.ppo.minibatches as u64).max(1);
         let row = sizes.observation.saturating_add(product(&[4, sum(actor).saturating_add(sum(&self.ppo.hidden))]));
         let mut parts = vec![networks(numbers, key), minibatch(rows, row, "`ppo.hidden`; or more `ppo.minibatches`")];
-        parts.extend(sizes.convolutions(&self.ppo.cnn, 1, "`ppo.cnn`"));
+        // Target and predictor of curiosity have convolutions of their own.
+        let convolutions = match &self.ppo.curiosity {
+            Curiosity::Off => 1,
+            Curiosity::Rnd { hidden, features, .. } => {
+                let twice: Vec<usize> = [&hidden[..], hidden].concat();
+                let features = *features as u64;
+                let both =
+                    layers(sizes.inputs, hidden, features).saturating_add(layers(sizes.inputs, &twice, features));
+                parts.push(networks(both, "`ppo.curiosity`"));
+                3
+            }
+        };
+        parts.extend(sizes.convolutions(&self.ppo.cnn, convolutions, "`ppo.cnn`"));
         parts
     }
 

@@ -708,8 +708,11 @@ mod config_set_tests {
             "skills.weight_decay=0.01",
             "skills.augment=[Translate(2)]",
             "skills.state_weight=2",
+            "ppo.curiosity=Rnd(share: 0.5)",
         ];
-        let skills = experiment().with_set(&sets).expect("known keys").skills;
+        let Experiment { skills, ppo, .. } = experiment().with_set(&sets).expect("known keys");
+        let text = serde_json::to_string(&ppo.curiosity).expect("plain values");
+        assert!(text.starts_with(r#"{"Rnd":{"extrinsic":2.0,"#) && text.contains(r#""share":0.5"#), "{text}");
         assert_eq!((skills.held_out, skills.patience, skills.weight_decay), (0.1, Some(3), 0.01));
         assert!(skills.anneal_lr);
         assert_eq!(skills.state_weight, 2.0);
