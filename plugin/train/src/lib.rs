@@ -24,6 +24,7 @@ mod error;
 pub mod experiment;
 pub mod learn_skills;
 pub mod lesson;
+mod levels;
 pub mod metrics_log;
 pub mod pipeline;
 pub mod policy_export;
