@@ -1,4 +1,4 @@
-//! Queues of the levels that agents play.
+//! Queues of the levels that agents play, the files of levels, and what levels draw.
 //!
 //! ```
 //! use bevy_playbot::{prelude::*, streams::AgentStreams};
@@ -189,6 +189,29 @@ impl fmt::Display for LevelFile {
         write!(f, "{} (hash {:016x})", self.path, self.hash)
     }
 }
+
+/// One value of the game that a level has drawn, by its path.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Reflect)]
+pub struct RandomisedValue {
+    /// Path of the value, such as `Gravity.0`.
+    pub path: String,
+    /// The value that it has in this episode.
+    pub value: f64,
+}
+
+impl fmt::Display for RandomisedValue {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} = {}", self.path, self.value)
+    }
+}
+
+/// The values of the game that were drawn for the level of an agent's current episode. Missing if there were none.
+///
+/// A trainer draws them, and puts them on the agent whose episode begins. The recorder writes them with the episode, and a
+/// replay of it brings them back.
+#[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component, CarryComponent, Clone, Debug, PartialEq)]
+pub struct RandomisedValues(pub Vec<RandomisedValue>);
 
 /// The files of a World's levels: level i is file i. Missing where levels are not files.
 #[derive(Resource, Clone, Debug, Default, Reflect)]

@@ -21,7 +21,8 @@ use bevy_playbot::{
     vision::{ImageOptions, ObservationConfig},
 };
 use playbot_harness::{
-    eval::EvalPlan, game::Game, games::Games, inspect::ExperimentText, machine::MOST_WORLDS, split::LevelSplit,
+    eval::EvalPlan, game::Game, games::Games, inspect::ExperimentText, machine::MOST_WORLDS, randomise::Randomise,
+    split::LevelSplit,
 };
 use playbot_learner::{
     PpoConfig, RlpdConfig, SacConfig, ScoreConfig, SkillConfig, SpirlConfig, settings,
@@ -63,6 +64,10 @@ settings! {
     /// The choice among the levels.
     levels: LevelsConfig, keys of LevelsConfig,
         serde(default, skip_serializing_if = "is_off");
+    /// Numbers of the game that each level multiplies by factors of its own, in training and evaluation, by their paths.
+    /// A path is `Resource.field` or `Marker.Component.field`; the types derive `Reflect`.
+    randomise: Randomise = Randomise::default(), such as "{\"Gravity.0\": \"0.8..1.2\"}",
+        serde(default, skip_serializing_if = "Randomise::is_empty");
     /// Held-out levels to evaluate on; never trained on.
     test: LevelSplit, such as "\"hard:64..127\"";
     /// File or folder of recordings; `None` for algorithms that learn nothing from any. A relative path in a file, also
@@ -197,6 +202,7 @@ impl Experiment {
             arenas: self.arenas,
             worlds: self.worlds,
             threads,
+            randomise: self.randomise.clone(),
         }
     }
 

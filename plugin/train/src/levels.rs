@@ -11,7 +11,7 @@ mod plr;
 use crate::{
     experiment::{Experiment, LevelOrder},
     levels::plr::{LevelScores, PlrSettings, RunningMeans},
-    metrics_log::LESSON_SUCCESS,
+    metrics_log::{LESSON, LESSON_SUCCESS},
 };
 use bevy_playbot::level::LevelQueue;
 use playbot_harness::split::LevelSplit;
@@ -209,7 +209,7 @@ impl LevelPlan {
     pub(crate) fn scalars(&self) -> Vec<(&'static str, f64)> {
         let mut scalars = Vec::new();
         if self.lessons.len() > 1 {
-            scalars.push(("levels/lesson", (self.state.lesson + 1) as f64));
+            scalars.push((LESSON, (self.state.lesson + 1) as f64));
             scalars.push(("levels/lesson_episodes", self.state.recent.len() as f64));
             scalars.extend(self.success().map(|success| (LESSON_SUCCESS, success)));
         }

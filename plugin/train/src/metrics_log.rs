@@ -36,6 +36,9 @@ pub const CLIPPED_SHARE: &str = "charts/clipped_share";
 /// Tag of the number of episodes that have ended.
 pub const EPISODES: &str = "charts/episodes";
 
+/// Tag of the number of the current lesson, from 1 on.
+pub const LESSON: &str = "levels/lesson";
+
 /// Tag of the success rate of the last episodes of the current lesson.
 pub const LESSON_SUCCESS: &str = "levels/lesson_success";
 

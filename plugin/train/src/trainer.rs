@@ -25,7 +25,7 @@ use playbot_harness::{
     parallel::{on_own_threads, on_threads, one_by_one},
     sensors::GameSensors,
     split::LevelSplit,
-    worlds::{Arrangement, is_bound_to_its_thread},
+    worlds::{check_randomised, is_bound_to_its_thread},
 };
 use playbot_learner::{
     ActionSpace, ContinuedSchedule, DeviceKind, FileError, LearnError, Learner, LearnerMetrics, ObsColumns, ObsKind,
@@ -122,7 +122,7 @@ impl Trainer {
         levels: Option<LevelState>,
     ) -> Result<Self, TrainError> {
         let prior = learner.skills().as_ref().map(SkillPrior::from);
-        let of_experiment = Arrangement::of_agents(game, experiment.arenas, experiment.worlds);
+        let of_experiment = experiment.arrangement(game);
         let arrangement = match experiment.observation {
             // A graphics card draws for few Worlds sooner.
             ObservationKind::Camera => of_experiment,
@@ -139,8 +139,9 @@ impl Trainer {
                 for (agents, levels) in plan.parts_by_mode(first as usize..(first + share) as usize, lesson) {
                     let (first, count) = (agents.start as u32, agents.len() as u32);
                     let prior = prior.clone();
-                    let collector = Collector::new(game, levels, &observation_config, seed, first, count, prior)?;
+                    let mut collector = Collector::new(game, levels, &observation_config, seed, first, count, prior)?;
                     check_spaces(game, levels, &collector)?;
+                    experiment.randomise.install(collector.world_mut());
                     collectors.push(collector);
                 }
             }
@@ -501,7 +502,9 @@ pub(crate) fn check(game: &dyn Game, experiment: &Experiment) -> Result<(), Trai
     experiment.check()?;
     experiment.check_game(game)?;
     experiment.observation_config().check(game)?;
-    Ok(experiment.check_memory(game)?)
+    experiment.check_memory(game)?;
+    let train = &experiment.train;
+    Ok(check_randomised(&experiment.randomise, game, &train.mode, train.first)?)
 }
 
 /// A finished episode, as the moving averages keep it.

@@ -391,8 +391,10 @@ impl Experiment {
         self.check_threads(self.arrangement(game), room.threads)
     }
 
-    fn arrangement(&self, game: &dyn Game) -> Arrangement {
-        Arrangement::of_agents(game, self.arenas, self.worlds)
+    /// Returns the Worlds of a training: one for each arena if levels draw values, which are those of a World.
+    pub(crate) fn arrangement(&self, game: &dyn Game) -> Arrangement {
+        let shared = Arrangement::of_agents(game, self.arenas, self.worlds);
+        if self.randomise.is_empty() { shared } else { shared.apart(game) }
     }
 
     fn training_parts(&self, game: &dyn Game, sizes: &Sizes) -> Vec<MemoryPart> {
