@@ -1,4 +1,4 @@
-//! Queues of the levels that agents play.
+//! Queues of the levels that agents play, the files of levels, and what levels draw.
 //!
 //! ```
 //! use bevy_playbot::{prelude::*, streams::AgentStreams};
@@ -59,6 +59,8 @@ pub enum LevelQueue {
         /// Highest level, included.
         last: u64,
     },
+    /// Levels with a share each, and new ones, from the agent's own random stream.
+    Weighted(Arc<WeightedLevels>),
     /// A rule of the game.
     Custom(Box<dyn LevelSource>),
 }
@@ -95,8 +97,63 @@ impl LevelQueue {
                 level
             }
             Self::Uniform { first, last } => Some(rng.random_range(*first..=*last)),
+            Self::Weighted(levels) => Some(levels.draw(rng)),
             Self::Custom(source) => source.next_level(),
         }
+    }
+}
+
+/// Levels of a range that are drawn again by their weights, and the others, which are new.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WeightedLevels {
+    first: u64,
+    last: u64,
+    /// Levels that are drawn by their weights, ascending.
+    known: Vec<u64>,
+    /// The sum of the weights up to each of them, its own included.
+    sums: Vec<f64>,
+    new: f64,
+}
+
+impl WeightedLevels {
+    /// Creates it from the range `first..=last`, the levels in it that were played already, each with its weight, and the
+    /// probability of a new one while there are any. Levels outside the range are ignored. A weight that is no positive
+    /// number counts as 0.
+    pub fn new(first: u64, last: u64, weights: impl IntoIterator<Item = (u64, f64)>, new: f64) -> Self {
+        let (mut known, mut sums, mut sum) = (Vec::new(), Vec::new(), 0.0);
+        let mut weights: Vec<(u64, f64)> = weights.into_iter().collect();
+        weights.sort_by_key(|(level, _)| *level);
+        weights.dedup_by_key(|(level, _)| *level);
+        for (level, weight) in weights {
+            if (first..=last).contains(&level) {
+                sum += if weight > 0.0 && weight.is_finite() { weight } else { 0.0 };
+                known.push(level);
+                sums.push(sum);
+            }
+        }
+        Self { first, last, known, sums, new }
+    }
+
+    /// Draws a level: a new one with its probability, each of them alike, or else one of the others by their weights.
+    fn draw(&self, rng: &mut impl Rng) -> u64 {
+        let news = (self.last - self.first).saturating_add(1).saturating_sub(self.known.len() as u64);
+        let Some(sum) = self.sums.last().filter(|_| news == 0 || rng.random::<f64>() >= self.new) else {
+            return self.nth_new(rng.random_range(0..news.max(1)));
+        };
+        let at = rng.random::<f64>() * sum;
+        let index = self.sums.partition_point(|sum| *sum <= at).min(self.known.len() - 1);
+        self.known[index]
+    }
+
+    /// Returns a level of the range that is not among the known ones, by its number among them, from 0.
+    fn nth_new(&self, n: u64) -> u64 {
+        let (mut low, mut high) = (0, self.known.len());
+        // The number of known levels before the new one: those with at most `n` new levels before them.
+        while low < high {
+            let middle = usize::midpoint(low, high);
+            if self.known[middle] - self.first - middle as u64 <= n { low = middle + 1 } else { high = middle }
+        }
+        (self.first + n).saturating_add(low as u64).min(self.last)
     }
 }
 
@@ -132,6 +189,29 @@ impl fmt::Display for LevelFile {
         write!(f, "{} (hash {:016x})", self.path, self.hash)
     }
 }
+
+/// One value of the game that a level has drawn, by its path.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Reflect)]
+pub struct RandomisedValue {
+    /// Path of the value, such as `Gravity.0`.
+    pub path: String,
+    /// The value that it has in this episode.
+    pub value: f64,
+}
+
+impl fmt::Display for RandomisedValue {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} = {}", self.path, self.value)
+    }
+}
+
+/// The values of the game that were drawn for the level of an agent's current episode. Missing if there were none.
+///
+/// A trainer draws them, and puts them on the agent whose episode begins. The recorder writes them with the episode, and a
+/// replay of it brings them back.
+#[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component, CarryComponent, Clone, Debug, PartialEq)]
+pub struct RandomisedValues(pub Vec<RandomisedValue>);
 
 /// The files of a World's levels: level i is file i. Missing where levels are not files.
 #[derive(Resource, Clone, Debug, Default, Reflect)]
@@ -180,6 +260,37 @@ impl LevelFiles {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn new_levels_are_those_between_the_known_ones() {
+        let levels = WeightedLevels::new(10, 15, [(10, 1.0), (12, f64::NAN), (13, 0.0), (99, 1.0)], 1.0);
+        assert_eq!([0, 1, 2].map(|n| levels.nth_new(n)), [11, 14, 15]);
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let drawn: BTreeSet<u64> = (0..100).map(|_| levels.draw(&mut rng)).collect();
+        assert_eq!(drawn, BTreeSet::from([11, 14, 15]), "all are new");
+        assert_eq!(WeightedLevels::new(7, 7, [], 0.0).draw(&mut rng), 7, "nothing is known yet");
+    }
+
+    #[test]
+    fn known_levels_are_drawn_by_their_weights_once_there_is_no_new_one() {
+        let mut queue = LevelQueue::Weighted(Arc::new(WeightedLevels::new(3, 5, [(5, 1.0), (3, 1.0), (4, 2.0)], 0.9)));
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let mut counts = [0; 3];
+        (0..4000).for_each(|_| counts[queue.next_level(&mut rng).expect("endless") as usize - 3] += 1);
+        // A quarter, a half and a quarter of 4000, within four standard deviations.
+        assert!(counts.iter().zip([1000, 2000, 1000]).all(|(got, wanted)| i32::abs(got - wanted) < 127), "{counts:?}");
+    }
+
+    #[test]
+    fn new_levels_come_with_their_probability() {
+        let levels = WeightedLevels::new(0, 99, [(50, 3.0)], 0.25);
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        let again = (0..4000).filter(|_| levels.draw(&mut rng) == 50).count();
+        assert!((2890..=3110).contains(&again), "{again} of 3000 expected, within four standard deviations");
+    }
 
     fn file(path: &str, hash: u64) -> LevelFile {
         LevelFile { path: path.to_owned(), hash }

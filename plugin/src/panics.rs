@@ -12,7 +12,7 @@ use crate::{
     },
     episode::Episode,
     fault::Fault,
-    level::LevelFiles,
+    level::{LevelFiles, RandomisedValues},
     panics::origin::panic_origin,
     placement::TickSchedules,
     reward::Reward,
@@ -221,6 +221,7 @@ fn report(world: &mut World, words: &str) -> String {
         let trace = world.get::<EpisodeTrace>(entity).and_then(|trace| trace.0.clone());
         let mut kept = whole(trace.filter(|_| episode.is_running()), agent, episode);
         kept.level_file = world.get_resource::<LevelFiles>().and_then(|files| files.of(episode.level)).cloned();
+        kept.randomised = world.get::<RandomisedValues>(entity).map(|drawn| drawn.0.clone()).unwrap_or_default();
         episodes.push(kept);
     }
     let place = if at.is_empty() { "before any level was played".to_owned() } else { at.join("; ") };
@@ -262,7 +263,10 @@ fn keep(
     let name = format!("panic-{}-{place}-{}.demo", reports.header.game, std::process::id());
     let path = folder.join(name);
     let note = "kept when the game panicked in its last tick".to_owned();
-    let mut writer = DemoWriter::replace(&path, DemoHeader { note, ..reports.header.clone() })?;
+    let header = DemoHeader { note, ..reports.header.clone() };
+    let draws = episodes.iter().any(|episode| !episode.randomised.is_empty());
+    let header = if draws { header.with_randomised_values() } else { header };
+    let mut writer = DemoWriter::replace(&path, header)?;
     episodes.iter().try_for_each(|episode| writer.push(episode))?;
     Ok(Some(path))
 }

@@ -26,7 +26,11 @@ fn restart(event: On<StartEpisode>, mut cells: Query<&mut Cell>) {
     }
 }
 
-fn see(mut agents: Query<(&Cell, &Episode, &mut Observation), With<VectorSensor>>, poison: Option<Res<PoisonAt>>) {
+/// Shows each agent its cell and the time.
+pub fn see_corridor(
+    mut agents: Query<(&Cell, &Episode, &mut Observation), With<VectorSensor>>,
+    poison: Option<Res<PoisonAt>>,
+) {
     for (cell, episode, mut observation) in &mut agents {
         let poisoned = poison.as_ref().is_some_and(|poison| poison.0 == episode.tick);
         let x = if poisoned { f32::NAN } else { cell.0 as f32 / 3.0 - 1.0 };
@@ -58,7 +62,7 @@ fn walk(
 
 /// Adds the corridor's rules to an app.
 pub fn corridor_plugin(app: &mut App) {
-    app.add_observer(restart).add_systems(ObserveSchedule, see).add_systems(FixedUpdate, walk);
+    app.add_observer(restart).add_systems(ObserveSchedule, see_corridor).add_systems(FixedUpdate, walk);
 }
 
 /// Spawns an agent of the corridor.

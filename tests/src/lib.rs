@@ -17,5 +17,5 @@ pub mod small;
 pub mod soak;
 pub mod training;
 
-pub use corridor::{Cell, Corridor, Drift, PoisonAt, corridor_plugin, spawn_walker};
+pub use corridor::{Cell, Corridor, Drift, PoisonAt, corridor_plugin, see_corridor, spawn_walker};
 pub use painted::PaintedCorridor;

@@ -1,7 +1,7 @@
 //! Measurement of players in tests.
 
 use bevy_playbot::vision::ObservationConfig;
-use playbot_harness::eval::EvalPlan;
+use playbot_harness::{eval::EvalPlan, randomise::Randomise};
 use std::collections::BTreeSet;
 
 /// Returns a plan of one episode on each of these levels, by four arenas in two Worlds on two threads.
@@ -15,5 +15,6 @@ pub fn plan(levels: &str) -> EvalPlan {
         arenas: 4,
         worlds: 2,
         threads: 2,
+        randomise: Randomise::default(),
     }
 }

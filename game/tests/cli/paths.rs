@@ -61,12 +61,14 @@ fn paths_in_an_experiment_start_in_its_folder_or_else_in_this_one() {
     write("own/train/1.json", &level("1"));
     write("test/1.json", &level("2"));
     write("own/base/test/1.json", &level("3"));
+    ["own/easy/1.json", "own/base/easy/1.json"].map(|path| write(path, &level("4")));
     write("own/walks.demo", "");
     write("walks.demo", "");
     write("others.demo", "");
     let rest = r#"test: "files:test/*.json", steps: 128"#;
     let text = format!(
         r#"(game: "coinrun", train: "files:train/*.json:0..0", demos: "walks.demo", {rest},
+        curriculum: (lessons: [(levels: "files:easy/*.json", success: 0.5)]),
         variants: [(name: "a", set: ["train=files:train/1.json", "demos=others.demo"]), (name: "b")])"#
     );
     write("own/small.ron", &text);
@@ -77,6 +79,7 @@ fn paths_in_an_experiment_start_in_its_folder_or_else_in_this_one() {
     for line in [
         r#"train: "files:own/train/*.json:0..0","#,
         r#"test: "files:test/*.json:0..0","#,
+        r#"levels: "files:own/easy/*.json:0..0","#,
         r#"demos: "own/walks.demo","#,
         r#""train=files:own/train/1.json","#,
         r#""demos=others.demo""#,
@@ -88,6 +91,7 @@ fn paths_in_an_experiment_start_in_its_folder_or_else_in_this_one() {
     for line in [
         r#"train: "files:own/base/../train/*.json:0..0","#,
         r#"test: "files:own/base/test/*.json:0..0","#,
+        r#"levels: "files:own/base/easy/*.json:0..0","#,
         r#"demos: "others.demo","#,
     ] {
         assert!(shown.contains(line), "{line} is not in {shown}");

@@ -12,6 +12,7 @@ use crate::{
     game::Game,
     mode::ModeError,
     parallel::{default_threads, on_threads},
+    randomise::follow_recordings,
     split::LevelSplit,
     worlds::build_world,
 };
@@ -160,6 +161,9 @@ impl EpisodeReplayer {
     ) -> Result<Option<Divergence>, Fault> {
         if episode.is_empty() {
             return Ok(None);
+        }
+        if !episode.randomised.is_empty() {
+            follow_recordings(&mut self.world);
         }
         Replay::begin(episode, &mut self.world.entity_mut(self.agent));
         loop {

@@ -4,6 +4,7 @@ use crate::{
     game::Game,
     machine::{MemoryError, check_bytes},
     parallel::on_threads,
+    randomise::Randomise,
     split::LevelSplit,
     worlds::{Arrangement, BuildingCosts, EndedEpisodes, arenas_within, build_observing_world},
 };
@@ -168,6 +169,8 @@ pub struct EvalPlan {
     pub worlds: u32,
     /// Threads. They change no result.
     pub threads: usize,
+    /// Values of the game that each level draws anew.
+    pub randomise: Randomise,
 }
 
 /// Most Worlds of a plan for bots.
@@ -186,6 +189,7 @@ impl EvalPlan {
             arenas,
             worlds: BOT_WORLDS.min(arenas),
             threads,
+            randomise: Randomise::default(),
         }
     }
 
@@ -193,6 +197,7 @@ impl EvalPlan {
     /// no more Worlds than the plan has, except for more threads.
     fn arrangement(&self, game: &dyn Game) -> Arrangement {
         let arrangement = Arrangement::of_agents(game, arenas_within(game, self.arenas, self.worlds), self.worlds);
+        let arrangement = if self.randomise.is_empty() { arrangement } else { arrangement.apart(game) };
         match self.observation_config.kind {
             // A graphics card draws for few Worlds sooner.
             ObservationKind::Camera => arrangement,
@@ -343,6 +348,7 @@ fn build_eval_world(
     let (mut world, agents) =
         build_observing_world(game, &plan.split.mode, &observation_config, plan.seed, first, per_world)?;
     EndedEpisodes::note_in(&mut world);
+    plan.randomise.install(&mut world);
     let all: Vec<u64> = (0..plan.episodes_per_level).flat_map(|_| plan.levels()).collect();
     for (offset, &agent) in agents.iter().enumerate() {
         let levels: Vec<u64> =

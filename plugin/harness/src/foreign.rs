@@ -67,7 +67,6 @@ mod input;
 mod ldtk;
 mod levels;
 mod observe;
-mod paths;
 mod restart;
 mod runtime;
 mod snapshot;
@@ -109,9 +108,9 @@ pub use crate::foreign::{
     guess::{PLAYER_NAMES, PlayerGuess},
     levels::{EditorLevel, IntoLevelTextError, LevelFromFile, PlayedMode},
     observe::IntoPlanPosition,
-    paths::PathError,
     runtime::{IntoActionValue, IntoValues, LevelSeed, PlayedAgent, Restart},
 };
+pub use crate::reflected_path::PathError;
 
 /// Default number of frames that a level may take to load.
 const PATIENCE: u32 = 3600;

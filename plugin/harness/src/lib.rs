@@ -11,7 +11,8 @@
 //!   plugin; [`games`], the games of a program; [`mode`], errors of modes; [`prelude`], the imports of a game.
 //! - its levels: [`split`], named ranges of levels; [`level_files`], levels from files; [`floor_plan`], their plans.
 //! - its Worlds: [`worlds`], headless Worlds with any number of agents, and the episodes that ended in them;
-//!   [`sensors`], what their agents see; [`saved_episode`], episodes that are saved in the middle.
+//!   [`sensors`], what their agents see; [`saved_episode`], episodes that are saved in the middle;
+//!   [`randomise`], values of the game that each level draws anew.
 //! - its players: [`eval`], evaluation of players on levels; [`demo`], recordings made and verified; [`detector`], the
 //!   contract of detectors of defects; [`defect`], the kinds of planted defects.
 //! - views: [`doctor`], the examination of a game's determinism; [`inspect`], single levels and steps; [`trace`], given
@@ -62,6 +63,8 @@ pub mod machine;
 pub mod mode;
 pub mod parallel;
 pub mod prelude;
+pub mod randomise;
+mod reflected_path;
 pub mod saved_episode;
 pub mod sealed_file;
 pub mod sensors;

@@ -4,21 +4,24 @@ use crate::{
     benchmark::{StageClock, add_readings},
     game::{Game, idle_action, level_designs},
     level_files::is_level_files,
+    randomise::Randomise,
     sensors::GameSensors,
 };
 use bevy::{app::Main, ecs::schedule::SingleThreadedExecutor, prelude::*};
 use bevy_playbot::{
     action::ActionValue,
-    agent::{Agent, AgentOrder},
+    agent::{Agent, AgentOrder, Control},
+    bot::BlindBot,
     engine::{
         AgentLimit, NextEpisode, PlaysAlong, Renewal, headless_frame_app, into_world,
         panics::{self, EpisodeTrace, PanicReports},
-        set_tick_rate,
+        set_tick_rate, tick_world,
     },
     episode::{EpisodeEnded, EpisodeResult, Tick},
     fault::{Fault, Faults},
     headless::{HeadlessPlugins, PlaybotAppExt, headless_app},
     legal::IdleAction,
+    level::LevelQueue,
     observation::{Observation, VectorSensor},
     placement::TickPlacement,
     reward::Reward,
@@ -141,6 +144,24 @@ pub fn check_start_and_look(
     // Other faults are those of a level, too.
     look(&world, agents[0]);
     Ok(())
+}
+
+/// Checks that each path of [`Randomise`] leads to a number in a level, in a World of its own. Without paths no World is
+/// built.
+///
+/// # Errors
+///
+/// The path, and where it leads; or the game's own fault in its first tick.
+pub fn check_randomised(randomise: &Randomise, game: &dyn Game, mode: &str, level: u64) -> Result<(), Fault> {
+    if randomise.is_empty() {
+        return Ok(());
+    }
+    let (mut world, agents) = build_world(game, mode, 0, 0, game.tools().host.agents_per_arena().max(1));
+    randomise.install(&mut world);
+    for agent in agents {
+        world.entity_mut(agent).insert((Control::Bot, BlindBot::Uniform, LevelQueue::Always(level)));
+    }
+    tick_world(&mut world)
 }
 
 /// Builds a World. If the game panics meanwhile, the World has no game, and each of its ticks is this fault.
@@ -374,6 +395,14 @@ impl Arrangement {
             0 | 1 => Self::new(game, agents, worlds),
             sharing => Self { worlds: agents.div_ceil(sharing).max(1), arenas: sharing },
         }
+    }
+
+    /// Gives each arena a World of its own, for values that are those of a whole World. The agents and their order stay.
+    pub fn apart(self, game: &dyn Game) -> Self {
+        if game.tools().host.agents_per_arena() > 1 {
+            return self;
+        }
+        Self { worlds: self.total(), arenas: 1 }
     }
 
     /// Splits the Worlds into equal parts while there are no more than threads, so that each thread has one. The agents

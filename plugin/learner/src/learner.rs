@@ -50,6 +50,14 @@ pub trait Learner: Debug + Send {
     /// trained yet) and the divergence is not exactly 0; [`LearnError::Shape`].
     fn initial_kl(&self, z: &[f32], obs: ObsSlice<'_>, n: usize) -> Result<Option<f32>, LearnError>;
 
+    /// Returns the sizes of the advantages of the last rollout, |A| for each of its rows, before they were normalised:
+    /// how much the critic could still learn there (Jiang et al. 2021, "Prioritized Level Replay", "L1 value loss").
+    /// `None` in a row in which nothing was decided. Empty before the first rollout, and for a learner that estimates no
+    /// advantages.
+    fn advantage_sizes(&self) -> &[Option<f32>] {
+        &[]
+    }
+
     /// Writes the complete state, so that training continues bit for bit. The file gets a temporary name first, so a
     /// checkpoint is complete or absent.
     ///

@@ -78,6 +78,8 @@ pub struct PpoLearner {
     taken_up: Option<TakenUp>,
     /// True if it began with the weights of another run, and so is no copy of the decoder.
     is_continuation: bool,
+    /// Sizes of the last rollout's advantages.
+    advantage_sizes: Vec<Option<f32>>,
 }
 
 impl PpoLearner {
@@ -138,7 +140,8 @@ impl PpoLearner {
     fn with_nets(config: PpoConfig, base: LearnerBase, nets: &PpoNets, curiosity: Option<Rnd>) -> Self {
         let PpoConfig { adam_eps: eps, weight_decay, .. } = config;
         let adam = Adam::new(AdamConfig { eps, weight_decay, ..AdamConfig::default() });
-        Self { config, base, nets: tracked(nets), adam, curiosity, taken_up: None, is_continuation: false }
+        let (taken_up, is_continuation, advantage_sizes) = (None, false, Vec::new());
+        Self { config, base, nets: tracked(nets), adam, curiosity, taken_up, is_continuation, advantage_sizes }
     }
 
     /// Returns the settings.
@@ -206,6 +209,10 @@ impl Learner for PpoLearner {
         self.base.initial_kl(&self.policy(), is_copy, StateBatch { z, left: &[], memory: &[], obs, n })
     }
 
+    fn advantage_sizes(&self) -> &[Option<f32>] {
+        &self.advantage_sizes
+    }
+
     /// Saves the learner. Weights are called `actor.l0.weight` (`[inputs, outputs]`), moments
     /// `adam.m.actor.l0.weight`.
     fn save(&self, path: &Path) -> Result<(), FileError> {
@@ -253,6 +260,8 @@ impl PpoLearner {
         let config = &self.config;
         let mut estimate = gae(rollout, &rewards, config.gamma, config.lambda, config.time_limit);
         let explained_variance = explained_variance(&rollout.values, &estimate.returns);
+        self.advantage_sizes.clear();
+        self.advantage_sizes.extend(estimate.advantages.iter().map(|advantage| Some(advantage.abs())));
         let latent = self.base.spec.latent;
         let teacher = self.teacher_output(rollout)?;
         let start = Instant::now();

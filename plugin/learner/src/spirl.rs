@@ -41,6 +41,8 @@ pub struct SpirlLearner {
     over_skills: OverSkills,
     /// The learner below the skills; `None` if the decoder is frozen.
     below: Option<PpoLearner>,
+    /// Sizes of the advantages of the last rollout's skills, in the rows in which they were drawn.
+    advantage_sizes: Vec<Option<f32>>,
 }
 
 impl SpirlLearner {
@@ -65,7 +67,7 @@ impl SpirlLearner {
         let ppo = PpoConfig { gamma, ent_coef, ..ppo };
         let teacher = Teacher::new(of_prior(&config, score, true), TiedTo::Prior, model, device)?;
         let learner = PpoLearner::fresh(ppo, teacher.policy_spec(), Some(teacher), seed, device)?;
-        Ok(Self { config, over_skills: OverSkills::Ppo(learner), below })
+        Ok(Self { config, over_skills: OverSkills::Ppo(learner), below, advantage_sizes: Vec::new() })
     }
 
     /// Creates a learner of `model`'s skills by SAC, which learns from every whole rollout. Of `score` only the skill
@@ -100,7 +102,7 @@ impl SpirlLearner {
         // It is tied to the prior by the cost of the divergence, without a penalty beside it.
         let teacher = Teacher::new(of_prior(&config, score, false), TiedTo::Prior, model, device)?;
         let learner = SacLearner::fresh(sac, teacher.policy_spec(), Some(teacher), seed, device)?;
-        Ok(Self { config, over_skills: OverSkills::Sac(learner), below })
+        Ok(Self { config, over_skills: OverSkills::Sac(learner), below, advantage_sizes: Vec::new() })
     }
 
     /// Returns the settings.
@@ -174,7 +176,7 @@ impl Learner for SpirlLearner {
         let spec = self.spec();
         rollout.check_for(&spec, self.rollout_latent())?;
         let kl_coef = self.kl_coef()?;
-        let of_skills = self.over_skills.learn(&self.config, rollout)?;
+        let of_skills = self.over_skills.learn(&self.config, rollout, &mut self.advantage_sizes)?;
         let of_skills = of_skills.into_iter().filter_map(|(tag, value)| Some((tag_of_skills(tag)?, value)));
         let mut scalars: Vec<_> = of_skills.chain([("spirl/kl_coef", kl_coef)]).collect();
         if let Some(below) = &mut self.below {
@@ -186,6 +188,11 @@ impl Learner for SpirlLearner {
     /// Returns the divergence between the prior and the policy over skills.
     fn initial_kl(&self, _: &[f32], obs: ObsSlice<'_>, n: usize) -> Result<Option<f32>, LearnError> {
         self.over_skills.learner().initial_kl(&[], obs, n)
+    }
+
+    /// Returns those of the policy over skills, in the rows in which a skill was drawn.
+    fn advantage_sizes(&self) -> &[Option<f32>] {
+        &self.advantage_sizes
     }
 
     /// Saves the learner. The checkpoints of its learners are in it whole, as bytes `over_skills` and `below`.
@@ -321,7 +328,7 @@ impl SpirlLearner {
             return Err(FileError::Format { path: path.to_owned(), detail });
         }
         let below = below.map(|file| PpoLearner::stored(file, device)).transpose()?;
-        Ok(Self { config: spirl, over_skills, below })
+        Ok(Self { config: spirl, over_skills, below, advantage_sizes: Vec::new() })
     }
 
     /// Returns the file that [`Learner::save`] writes.

@@ -28,7 +28,7 @@ use crate::{
     demo::file::{Decider, DemoActions, DemoEnd, DemoEpisode, DemoFileError, DemoWriter, EpisodeActions},
     episode::{Episode, EpisodeEnd},
     fault::Faults,
-    level::LevelFiles,
+    level::{LevelFiles, RandomisedValues},
     observation::Observation,
     reward::Reward,
     state_hash::StateHash,
@@ -127,6 +127,7 @@ pub fn record_ticks(
     order: Res<AgentOrder>,
     files: Option<Res<LevelFiles>>,
     mut agents: Query<(&Agent, &Control, &Action, &Reward, &StateHash, &Observation, &Episode, &mut Recording)>,
+    drawn: Query<&RandomisedValues>,
     mut faults: ResMut<Faults>,
 ) {
     let Some(mut recorder) = recorder else { return };
@@ -150,6 +151,7 @@ pub fn record_ticks(
             }
             let mut demo = DemoEpisode::new(episode.level, demo_actions(&agent.actions));
             demo.level_file = files.as_ref().and_then(|files| files.of(episode.level)).cloned();
+            demo.randomised = drawn.get(entity).map(|drawn| drawn.0.clone()).unwrap_or_default();
             recording.episode = Some(demo);
         }
         // Without its first ticks an episode cannot be replayed, so recording waits for the next one.

@@ -55,6 +55,8 @@ struct Collecting {
 pub struct Ended {
     /// The tick of the rollout, from 0 on.
     pub tick: usize,
+    /// Its agent, as a column of the rollout.
+    pub agent: usize,
     /// The episode.
     pub episode: EpisodeEnded,
 }
@@ -195,7 +197,8 @@ impl Collector {
             }
             ticked?;
             let finished = std::mem::take(&mut world.resource_mut::<Finished>().0);
-            ended.extend(finished.into_iter().map(|episode| Ended { tick, episode }));
+            let column = |agent: Entity| self.agents.iter().position(|own| *own == agent).unwrap_or_default();
+            ended.extend(finished.into_iter().map(|episode| Ended { tick, agent: column(episode.entity), episode }));
             let seen = world.resource::<PolicyBatch>().observations();
             columns.fill_next(seen.as_slice()).map_err(|error| Fault(error.to_string()))?;
         }
@@ -217,6 +220,25 @@ impl Collector {
     /// Returns the agents, in the order of their numbers.
     pub fn agents(&self) -> &[Entity] {
         &self.agents
+    }
+
+    /// Gives each agent the queue of its next levels. Episodes that run go on.
+    pub(crate) fn set_queues(&mut self, queues: &[LevelQueue]) {
+        for (&agent, queue) in self.agents.iter().zip(queues) {
+            self.world.entity_mut(agent).insert(queue.clone());
+        }
+    }
+
+    /// Returns the random streams of its agents.
+    pub(crate) fn streams(&self) -> Vec<AgentStreams> {
+        self.agents.iter().filter_map(|&agent| self.world.get::<AgentStreams>(agent).cloned()).collect()
+    }
+
+    /// Gives its agents the random streams of others.
+    pub(crate) fn set_streams(&mut self, streams: &[AgentStreams]) {
+        for (&agent, streams) in self.agents.iter().zip(streams) {
+            self.world.entity_mut(agent).insert(streams.clone());
+        }
     }
 }
 

@@ -5,6 +5,7 @@
 //! - `file`: experiment files in RON with their bases, and `--set`, which override one another key by key.
 //! - `keys`: the setting of each key, and messages about wrong ones.
 //! - `checks`: checks of an experiment, alone, against its game and against the machine's memory.
+//! - `lessons`: settings of the levels that a training plays: earlier lessons and their order.
 //! - `error`: errors of experiment files and of `--set`, with their positions.
 //! - `page`: the reference page of all settings.
 
@@ -12,6 +13,7 @@ pub(crate) mod checks;
 pub(crate) mod error;
 pub mod file;
 pub(crate) mod keys;
+mod lessons;
 pub mod page;
 
 use bevy_playbot::{
@@ -19,7 +21,8 @@ use bevy_playbot::{
     vision::{ImageOptions, ObservationConfig},
 };
 use playbot_harness::{
-    eval::EvalPlan, game::Game, games::Games, inspect::ExperimentText, machine::MOST_WORLDS, split::LevelSplit,
+    eval::EvalPlan, game::Game, games::Games, inspect::ExperimentText, machine::MOST_WORLDS, randomise::Randomise,
+    split::LevelSplit,
 };
 use playbot_learner::{
     ImitationConfig, PpoConfig, RlpdConfig, SacConfig, ScoreConfig, SkillConfig, SpirlConfig, settings,
@@ -28,7 +31,10 @@ use playbot_learner::{
 use serde::{Deserialize, Serialize, Serializer};
 use std::{collections::BTreeSet, fmt, path::PathBuf, str::FromStr};
 
-pub use crate::experiment::checks::ExperimentError;
+pub use crate::experiment::{
+    checks::ExperimentError,
+    lessons::{CurriculumConfig, CurriculumLesson, LevelOrder, LevelsConfig, MOST_SCORED},
+};
 pub use bevy_playbot::vision::ObservationKind;
 pub use playbot_assets::{ExperimentFile, PRESETS};
 
@@ -53,6 +59,16 @@ settings! {
     algorithm: Algorithm = score_ppo(), serde(default = "score_ppo");
     /// Levels to train on.
     train: LevelSplit, such as "\"hard:0..63\"";
+    /// Lessons before `train`.
+    curriculum: CurriculumConfig, keys of CurriculumConfig,
+        serde(default, skip_serializing_if = "is_off");
+    /// The choice among the levels.
+    levels: LevelsConfig, keys of LevelsConfig,
+        serde(default, skip_serializing_if = "is_off");
+    /// Numbers of the game that each level multiplies by factors of its own, in training and evaluation, by their paths.
+    /// A path is `Resource.field` or `Marker.Component.field`; the types derive `Reflect`.
+    randomise: Randomise = Randomise::default(), such as "{\"Gravity.0\": \"0.8..1.2\"}",
+        serde(default, skip_serializing_if = "Randomise::is_empty");
     /// Held-out levels to evaluate on; never trained on.
     test: LevelSplit, such as "\"hard:64..127\"";
     /// File or folder of recordings; `None` for algorithms that learn nothing from any. A relative path in a file, also
@@ -189,6 +205,7 @@ impl Experiment {
             arenas: self.arenas,
             worlds: self.worlds,
             threads,
+            randomise: self.randomise.clone(),
         }
     }
 

@@ -29,6 +29,7 @@ pub mod experiment;
 pub mod imitate;
 pub mod learn_skills;
 pub mod lesson;
+mod levels;
 pub mod metrics_log;
 pub mod pipeline;
 pub mod policy_export;

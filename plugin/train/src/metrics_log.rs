@@ -36,6 +36,12 @@ pub const CLIPPED_SHARE: &str = "charts/clipped_share";
 /// Tag of the number of episodes that have ended.
 pub const EPISODES: &str = "charts/episodes";
 
+/// Tag of the number of the current lesson, from 1 on.
+pub const LESSON: &str = "levels/lesson";
+
+/// Tag of the success rate of the last episodes of the current lesson.
+pub const LESSON_SUCCESS: &str = "levels/lesson_success";
+
 /// Tags of the means over the last 100 episodes.
 pub const EPISODE_MEANS: [&str; 3] = [EPISODIC_RETURN, EPISODIC_LENGTH, SUCCESS_RATE];
 
@@ -63,6 +69,8 @@ pub struct UpdateReport {
     pub clipped_share: Option<f64>,
     /// KL divergence from decoder to policy before the first update; only in the first report of SCORE.
     pub initial_kl: Option<f32>,
+    /// The current lesson, and the scores of its levels, by their tags; empty without a curriculum and an order of levels.
+    pub levels: Vec<(&'static str, f64)>,
     /// The learner's metrics.
     pub learner: LearnerMetrics,
     /// Time spent.
@@ -96,7 +104,7 @@ impl UpdateReport {
             ("score/initial_kl", self.initial_kl.map(f64::from)),
         ];
         let known = episodes.into_iter().filter_map(|(tag, value)| Some((tag, value?)));
-        known.chain(self.learner.scalars()).collect()
+        known.chain(self.levels.iter().copied()).chain(self.learner.scalars()).collect()
     }
 }
 
@@ -143,7 +151,7 @@ impl Timing {
 
 /// Returns the natural range of a metric; `None` if any value is possible.
 pub fn range_of(tag: &str) -> Option<(f64, f64)> {
-    [SUCCESS_RATE, CLIPPED_SHARE].contains(&tag).then_some((0.0, 1.0))
+    [SUCCESS_RATE, CLIPPED_SHARE, LESSON_SUCCESS].contains(&tag).then_some((0.0, 1.0))
 }
 
 /// The files of a run that hold its metrics.

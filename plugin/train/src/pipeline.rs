@@ -54,6 +54,7 @@ use playbot_harness::{
     game::Game,
     held_out::{HeldOut, KnownLevels},
     mode::ModeError,
+    randomise::Randomise,
     split::LevelSplit,
 };
 use playbot_learner::{FileError, HasExitCode, PolicyFile, SeenLevels, SkillModel};
@@ -171,6 +172,7 @@ pub fn record(game: &dyn Game, levels: &LevelSplit, noise: f64, path: &Path) -> 
         seed: 1,
         steps: None,
         keep_observations: false,
+        randomise: Randomise::default(),
     };
     let writer = DemoWriter::create(path, plan.header(game))?;
     let (mut world, agent) = plan.build_world(game, writer);

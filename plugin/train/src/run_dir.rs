@@ -23,6 +23,7 @@ use crate::{
         Algorithm, Experiment,
         file::{parse_experiment_with, read_experiment_text},
     },
+    levels::LevelState,
     metrics_log::{MetricsLog, UpdateReport},
     trainer,
     trainer::{Progress, TrainedLearner, Trainer},
@@ -86,6 +87,9 @@ pub struct RunInfo {
 struct TrainState {
     progress: Progress,
     arenas: Vec<Vec<ArenaState>>,
+    /// Missing without lessons and an order of levels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    levels: Option<LevelState>,
 }
 
 /// An open folder of a run.
@@ -226,7 +230,8 @@ impl RunDir {
         let keep = trainer.experiment().checkpoints.keep;
         checkpoint::write(&self.path, trainer.progress.summary(), keep, |fresh| {
             trainer.learner.save(&fresh.learner_file())?;
-            let state = TrainState { progress: trainer.progress.clone(), arenas: trainer.save_arenas() };
+            let (progress, levels) = (trainer.progress.clone(), trainer.level_state());
+            let state = TrainState { progress, arenas: trainer.save_arenas(), levels };
             Ok(write_sealed(&fresh.arenas_file(), &state)?)
         })
     }
@@ -247,7 +252,7 @@ impl RunDir {
         trainer::check(game, experiment)?;
         let (mut learner, state) = self.last_readable(experiment.algorithm, device)?;
         let continued_schedule = learner.set_length(experiment);
-        let mut trainer = Trainer::with_learner(game, experiment, learner, threads)?;
+        let mut trainer = Trainer::with_learner(game, experiment, learner, threads, state.levels)?;
         trainer.report_panics_to(&self.path);
         trainer.restore_arenas(&state.arenas).map_err(TrainError::from)?;
         (trainer.progress, trainer.continued_schedule) = (state.progress, continued_schedule);

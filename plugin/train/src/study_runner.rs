@@ -28,7 +28,7 @@ use playbot_harness::{
     eval::{EpisodeResult, EvalError, EvalPlan, EvalSummary, Player, evaluate, summarize},
     game::Game,
     games::Games,
-    held_out::{HeldOut, seen_by_training},
+    held_out::HeldOut,
     machine::free_memory,
     sealed_file::{SealedFileError, io_error, read_sealed, write_sealed},
     split::LevelSplit,
@@ -314,7 +314,7 @@ impl<'a> StudyRunner<'a> {
     ) -> Result<SeenLevels, StudyRunError> {
         let (experiment, folder) = (&run.experiment, self.folder.join(run.id()));
         let trained = || match experiment.algorithm.is_trained() {
-            true => seen_by_training(game, &experiment.train),
+            true => experiment.seen_by_training(game),
             false => SeenLevels { game: game.name().to_owned(), ..SeenLevels::default() },
         };
         end_replacement(&folder)?;

@@ -12,7 +12,7 @@ use crate::{
     trainer,
     trainer::Trainer,
 };
-use playbot_harness::{game::Game, held_out::seen_by_training, sealed_file::file_checksum};
+use playbot_harness::{game::Game, sealed_file::file_checksum};
 use playbot_learner::{ContinuedSchedule, DeviceKind, HasExitCode, SeenLevels, SkillModel};
 use playbot_report::{counted, whole};
 use std::path::{Path, PathBuf};
@@ -274,7 +274,7 @@ pub(crate) fn run_info(
 ) -> Result<RunInfo, RunError> {
     let experiment = new.experiment;
     let skill_file = new.skill_file.filter(|_| experiment.algorithm.needs_skills());
-    let mut seen = experiment.algorithm.has_checkpoints().then(|| seen_by_training(game, &experiment.train));
+    let mut seen = experiment.algorithm.has_checkpoints().then(|| experiment.seen_by_training(game));
     if let Some(recorded) = new.skills.and_then(SkillModel::demos).cloned().or(recorded) {
         seen.get_or_insert_with(|| recorded.clone()).extend(&recorded);
     }

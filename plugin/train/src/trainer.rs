@@ -5,30 +5,34 @@ use crate::{
     checkpoint::CheckpointSummary,
     collect::{ArenaState, Collector, Ended, RestoreError, restore_arenas, save_arenas},
     error::TrainError,
-    experiment::{Algorithm, Experiment, LearnerKind},
+    experiment::{Algorithm, Experiment, ExperimentError, LearnerKind},
+    levels::{EndedEpisode, LevelPlan, LevelState},
     metrics_log::{RECENT, Timing, UpdateReport},
 };
 use bevy::prelude::World;
 use bevy_playbot::{
+    agent::Agent,
     engine::{SharedBatch, panics::PanicReports},
     episode::EpisodeEnded,
     fault::Fault,
+    observation::VectorSensor,
     skill_prior::SkillPrior,
     vision::{ObservationConfig, ObservationKind},
 };
 use playbot_harness::{
     game::Game,
-    held_out::{HeldOut, seen_by_training},
+    held_out::HeldOut,
     parallel::{on_own_threads, on_threads, one_by_one},
     sensors::GameSensors,
-    worlds::{Arrangement, is_bound_to_its_thread},
+    split::LevelSplit,
+    worlds::{check_randomised, is_bound_to_its_thread},
 };
 use playbot_learner::{
     ActionSpace, ContinuedSchedule, DeviceKind, FileError, LearnError, Learner, LearnerMetrics, ObsColumns, ObsKind,
     Observations, Policy, PolicySpec, PpoLearner, Rollout, SacLearner, SeenLevels, SkillModel, SkillSource,
     SpirlLearner, Workers, shared_time,
 };
-use playbot_report::readable;
+use playbot_report::{counted, readable};
 use serde::{Deserialize, Serialize};
 use std::{
     collections::VecDeque,
@@ -49,6 +53,10 @@ pub struct Trainer {
     workers: Workers,
     pub(crate) learner: TrainedLearner,
     collectors: Vec<Collector>,
+    /// Worlds of later lessons in other modes, each with the lesson that they begin with.
+    later: VecDeque<(usize, Vec<Collector>)>,
+    /// The levels that they play.
+    plan: LevelPlan,
     /// Agents of each World of the experiment.
     per_world: usize,
     pub(crate) progress: Progress,
@@ -94,47 +102,64 @@ impl Trainer {
     ) -> Result<Self, TrainError> {
         check(game, experiment)?;
         let learner = Workers::new(threads).bound(|| TrainedLearner::new(game, experiment, skills, demos, device))?;
-        let mut seen = seen_by_training(game, &experiment.train);
+        let mut seen = experiment.seen_by_training(game);
         if let Some(demos) = skills.filter(|_| experiment.algorithm.needs_skills()).and_then(SkillModel::demos) {
             seen.extend(demos);
         }
-        let trainer = Self::with_learner(game, experiment, learner, threads)?;
+        let trainer = Self::with_learner(game, experiment, learner, threads, None)?;
         let is_normalised = normalises_observations(experiment)
             || (experiment.algorithm.needs_skills() && skills.is_some_and(|skills| skills.obs_stats().is_some()));
         let raw = if is_normalised { Vec::new() } else { game.observation().names };
         Ok(Self { seen: Some(seen), raw, ..trainer })
     }
 
-    /// Makes a trainer around an existing learner, for a checked experiment.
+    /// Makes a trainer around an existing learner, for a checked experiment, with the levels of a checkpoint.
     pub(crate) fn with_learner(
         game: &dyn Game,
         experiment: &Experiment,
         learner: TrainedLearner,
         threads: usize,
+        levels: Option<LevelState>,
     ) -> Result<Self, TrainError> {
         let prior = learner.skills().as_ref().map(SkillPrior::from);
-        let of_experiment = Arrangement::of_agents(game, experiment.arenas, experiment.worlds);
+        let of_experiment = experiment.arrangement(game);
         let arrangement = match experiment.observation {
             // A graphics card draws for few Worlds sooner.
             ObservationKind::Camera => of_experiment,
             _ => of_experiment.for_threads(game, threads),
         };
         let (share, per_world) = (arrangement.arenas, of_experiment.arenas as usize);
-        let (levels, observation_config, seed) = (&experiment.train, experiment.observation_config(), experiment.seed);
-        let collectors: Result<_, _> = arrangement
-            .first_agents()
-            .map(|first| Collector::new(game, levels, &observation_config, seed, first, share, prior.clone()))
-            .collect();
-        let (experiment, collectors) = (experiment.clone(), collectors?);
+        let (observation_config, seed) = (experiment.observation_config(), experiment.seed);
+        let sharing = game.tools().host.agents_per_arena() as usize;
+        let plan = LevelPlan::new(experiment, arrangement.total() as usize, sharing).restored(levels);
+        let mut later = VecDeque::new();
+        for lesson in plan.changes_of_mode() {
+            let mut collectors = Vec::new();
+            for first in arrangement.first_agents() {
+                for (agents, levels) in plan.parts_by_mode(first as usize..(first + share) as usize, lesson) {
+                    let (first, count) = (agents.start as u32, agents.len() as u32);
+                    let prior = prior.clone();
+                    let mut collector = Collector::new(game, levels, &observation_config, seed, first, count, prior)?;
+                    check_spaces(game, levels, &collector)?;
+                    experiment.randomise.install(collector.world_mut());
+                    collectors.push(collector);
+                }
+            }
+            later.push_back((lesson, collectors));
+        }
+        let (_, collectors) = later.pop_front().unwrap_or_default();
+        let experiment = experiment.clone();
         let obs_kind = observation_config.obs_kind(game);
         let (progress, obs) = (Progress::default(), Observations::empty(&obs_kind));
         let (seen, continued_schedule, raw, workers) = (None, None, Vec::new(), Workers::new(threads));
-        Ok(Self {
+        let mut trainer = Self {
             experiment,
             threads,
             workers,
             learner,
             collectors,
+            later,
+            plan,
             per_world,
             progress,
             seen,
@@ -142,7 +167,9 @@ impl Trainer {
             raw,
             obs_kind,
             obs,
-        })
+        };
+        trainer.renew_queues();
+        Ok(trainer)
     }
 
     /// Plays one rollout in every arena and learns from it, on at most as many threads as it was made for. The result
@@ -169,7 +196,9 @@ impl Trainer {
         }
         let initial_kl = self.initial_kl(&rollout)?;
         let learner = self.learner.learn(&rollout)?;
+        self.note_levels(&rollout, &finished);
         self.obs = rollout.obs;
+        let finished: Vec<EpisodeEnded> = finished.into_iter().map(|(_, ended)| ended.episode).collect();
         self.progress.note(&finished);
         self.progress.updates += 1;
         self.progress.steps += self.experiment.steps_per_update();
@@ -187,9 +216,64 @@ impl Trainer {
             alone_s: alone.as_secs_f64(),
         };
         let mut report = self.progress.report(learner, initial_kl, timing);
+        report.levels = self.plan.scalars();
         report.clipped_share =
             report.clipped_share.filter(|_| matches!(policy.action_space(), ActionSpace::Continuous(_)));
         Ok(report)
+    }
+
+    /// Decides which levels are played next, from the episodes of a rollout, each with its agent.
+    fn note_levels(&mut self, rollout: &Rollout, finished: &[(usize, Ended)]) {
+        if !self.plan.decides() {
+            return;
+        }
+        let ended = finished.iter().map(|(agent, Ended { tick, episode, .. })| EndedEpisode {
+            agent: *agent,
+            tick: *tick,
+            level: episode.level,
+            success: episode.success,
+        });
+        let ended: Vec<EndedEpisode> = ended.collect();
+        if self.plan.note(&ended, self.learner.advantage_sizes(), &rollout.done()) {
+            let (lesson, lessons) = self.plan.lesson();
+            tracing::info!("lesson {} of {lessons} begins after {} episodes", lesson + 1, self.progress.episodes);
+            self.change_worlds(lesson);
+        }
+        self.renew_queues();
+    }
+
+    /// Goes on in the Worlds of a lesson in another mode. Episodes that still run are left: the rollout ended with the
+    /// values of their states, as each does.
+    fn change_worlds(&mut self, lesson: usize) {
+        let Some((_, collectors)) = self.later.pop_front_if(|(first, _)| *first == lesson) else { return };
+        let streams: Vec<_> = self.collectors.iter().flat_map(Collector::streams).collect();
+        self.collectors = collectors;
+        let mut rest = streams.as_slice();
+        for collector in &mut self.collectors {
+            let (own, others) = rest.split_at(collector.agents().len().min(rest.len()));
+            collector.set_streams(own);
+            rest = others;
+        }
+        self.plan.begin_anew();
+    }
+
+    /// Gives all agents the queues of their next levels.
+    fn renew_queues(&mut self) {
+        if !self.plan.decides() {
+            return;
+        }
+        let queues = self.plan.queues();
+        let mut rest = queues.as_slice();
+        for collector in &mut self.collectors {
+            let (own, others) = rest.split_at(collector.agents().len().min(rest.len()));
+            collector.set_queues(own);
+            rest = others;
+        }
+    }
+
+    /// Returns the state of the levels, for a checkpoint.
+    pub(crate) fn level_state(&self) -> Option<LevelState> {
+        self.plan.state()
     }
 
     /// Updates the prior that draws skills, for algorithms that learn it.
@@ -236,12 +320,12 @@ impl Trainer {
             let (rollout, ended) = part?;
             rollouts.push(rollout);
             let world = agents / self.per_world.max(1);
-            finished.extend(ended.into_iter().map(|ended| (world, ended)));
+            finished.extend(ended.into_iter().map(|ended| (world, agents + ended.agent, ended)));
             agents += share;
         }
         // As if there were no more Worlds than the experiment has.
-        finished.sort_by_key(|(world, ended)| (*world, ended.tick));
-        let finished = finished.into_iter().map(|(_, ended)| ended.episode).collect();
+        finished.sort_by_key(|(world, _, ended)| (*world, ended.tick));
+        let finished = finished.into_iter().map(|(_, agent, ended)| (agent, ended)).collect();
         Ok(Collected { rollout: Rollout::join_around(obs, rollouts)?, finished, played, alone })
     }
 
@@ -331,7 +415,8 @@ impl Trainer {
 
     /// Sets the folder for reports of the game's panics, instead of the one for temporary files.
     pub fn report_panics_to(&mut self, folder: &Path) {
-        for world in self.worlds_mut() {
+        let later = self.later.iter_mut().flat_map(|(_, collectors)| collectors);
+        for world in self.collectors.iter_mut().chain(later).map(Collector::world_mut) {
             if let Some(mut reports) = world.get_resource_mut::<PanicReports>() {
                 reports.move_to(folder);
             }
@@ -352,7 +437,8 @@ impl Trainer {
 /// A rollout of all Worlds.
 struct Collected {
     rollout: Rollout,
-    finished: Vec<EpisodeEnded>,
+    /// Ended episodes, each with its agent as a column of the rollout.
+    finished: Vec<(usize, Ended)>,
     /// Time in which they played.
     played: Duration,
     /// The part of it in which one thread played, at most.
@@ -383,6 +469,31 @@ fn collect_together(
     collected.map_err(|source| TrainError::Threads { worlds: count, source })
 }
 
+/// Checks that the agents of a mode have the actions and the observation of the game.
+fn check_spaces(game: &dyn Game, levels: &LevelSplit, collector: &Collector) -> Result<(), TrainError> {
+    let refuse = |what: &str, found: String, wanted: String| {
+        let why = format!(
+            "agents of the mode `{}` have {found}, but one policy learns all lessons, and it has {wanted}: name lessons of \
+             modes with the same {what}",
+            levels.mode
+        );
+        let (key, value) = ("curriculum.lessons", levels.to_string());
+        Err(ExperimentError::Value { key, value, why }.into())
+    };
+    let (actions, seen) = (game.actions(), game.observation().len());
+    for &agent in collector.agents() {
+        let agent = collector.world().entity(agent);
+        if let Some(own) = agent.get::<Agent>().map(|agent| agent.actions).filter(|own| *own != actions) {
+            return refuse("actions", own.to_string(), actions.to_string());
+        }
+        let values = agent.get::<VectorSensor>().map(|sensor| sensor.space().len());
+        if let Some(own) = values.filter(|own| *own != seen) {
+            return refuse("observation", counted(own as u64, "observed value"), counted(seen as u64, "value"));
+        }
+    }
+    Ok(())
+}
+
 /// Checks that the experiment can be run on this game.
 pub(crate) fn check(game: &dyn Game, experiment: &Experiment) -> Result<(), TrainError> {
     if let Some(problem) = game.problem() {
@@ -391,7 +502,9 @@ pub(crate) fn check(game: &dyn Game, experiment: &Experiment) -> Result<(), Trai
     experiment.check()?;
     experiment.check_game(game)?;
     experiment.observation_config().check(game)?;
-    Ok(experiment.check_memory(game)?)
+    experiment.check_memory(game)?;
+    let train = &experiment.train;
+    Ok(check_randomised(&experiment.randomise, game, &train.mode, train.first)?)
 }
 
 /// A finished episode, as the moving averages keep it.
@@ -467,6 +580,7 @@ impl Progress {
             success_rate: self.success_rate(),
             clipped_share: self.clipped_share(),
             initial_kl,
+            levels: Vec::new(),
             learner,
             timing,
         }

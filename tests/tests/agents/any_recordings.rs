@@ -100,7 +100,15 @@ fn takes() -> impl Strategy<Value = Vec<Take>> {
 /// Records a file.
 fn record(game: &dyn Game, mode: &str, take: &Take, path: &Path) {
     let Take { levels, noise, seed, steps, keep_observations, .. } = take.clone();
-    let plan = DemonstrationPlan { mode: mode.to_owned(), levels, noise, seed, steps, keep_observations };
+    let plan = DemonstrationPlan {
+        mode: mode.to_owned(),
+        levels,
+        noise,
+        seed,
+        steps,
+        keep_observations,
+        randomise: Default::default(),
+    };
     let writer = DemoWriter::create(path, plan.header(game)).expect("a fresh file");
     let player = match game.tools().bots.demonstrator() {
         Some(_) if take.is_demonstrator => Player::Demonstrator,

@@ -13,6 +13,7 @@ mod faults;
 mod findings;
 mod lander;
 mod leaps;
+mod lessons;
 mod level_detectors;
 mod level_detectors;
 mod memories;

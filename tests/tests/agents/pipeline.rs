@@ -164,7 +164,15 @@ fn a_number_of_steps_is_recorded_over_the_levels_again_and_again() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("six.demo");
     let (mode, levels) = ("plain".to_owned(), vec![0, 1]);
-    let plan = DemonstrationPlan { mode, levels, noise: 0.0, seed: 1, steps: Some(6), keep_observations: true };
+    let plan = DemonstrationPlan {
+        mode,
+        levels,
+        noise: 0.0,
+        seed: 1,
+        steps: Some(6),
+        keep_observations: true,
+        randomise: Default::default(),
+    };
     let writer = DemoWriter::create(&path, plan.header(&Shown)).expect("a fresh file");
     let (mut world, _) = plan.build_world(&Shown, writer);
     while world.resource::<Recorder>().steps() < 6 {

@@ -17,8 +17,15 @@ use playbot_tests::Corridor;
 /// Records a bot that always does `action` on forty levels, with this noise.
 fn recorded(path: &Path, action: u32, noise: f64, seed: u64) -> Vec<DemoEpisode> {
     let levels = (0..40).collect();
-    let plan =
-        DemonstrationPlan { mode: "plain".to_owned(), levels, noise, seed, steps: None, keep_observations: false };
+    let plan = DemonstrationPlan {
+        mode: "plain".to_owned(),
+        levels,
+        noise,
+        seed,
+        steps: None,
+        keep_observations: false,
+        randomise: Default::default(),
+    };
     let writer = DemoWriter::create(path, plan.header(&Corridor)).expect("a fresh file");
     let player = Player::Blind(BlindBot::Constant(ActionValue::Discrete(action)));
     let built = plan.build_world_of(&Corridor, &player, &ObservationConfig::default(), writer);

@@ -13,6 +13,7 @@ mod namesakes;
 mod play;
 #[cfg(unix)]
 mod prints;
+mod randomised;
 mod rebuild;
 mod resets;
 mod restarts;

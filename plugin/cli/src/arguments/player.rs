@@ -21,7 +21,7 @@ use playbot_harness::{
     },
     game::Game,
     games::Games,
-    held_out::{HeldOut, seen_by_training},
+    held_out::HeldOut,
     sensors::GameSensors,
     split::LevelSplit,
 };
@@ -458,7 +458,7 @@ impl<'a> MeasuredLevels<'a> {
 
 /// Returns the levels that a run has seen; for runs without a note, its training levels.
 pub(crate) fn seen_by_run(game: &dyn Game, experiment: &Experiment, info: &RunInfo) -> SeenLevels {
-    info.seen.clone().unwrap_or_else(|| seen_by_training(game, &experiment.train))
+    info.seen.clone().unwrap_or_else(|| experiment.seen_by_training(game))
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ use playbot_learner::SkillMetrics;
 use playbot_report::{counted, whole};
 use playbot_train::{
     UpdateReport,
+    metrics_log::LESSON,
     run_observer::{CountedWork, Counter, KeptSkills, RecordingsSummary, RunEvent, RunObserver},
 };
 
@@ -215,7 +216,9 @@ fn report_held_out(kept: &KeptSkills) {
 fn speed_and_return(report: &UpdateReport, steps_per_update: u64) -> String {
     let sps = steps_per_update as f64 / (report.timing.collect_s + report.timing.learn_s);
     let current = report.episodic_return.map_or("-".to_owned(), |value| format!("{value:.2}"));
-    format!("{sps:.0} steps/s, return {current}")
+    let lesson = report.levels.iter().find(|(tag, _)| *tag == LESSON);
+    let lesson = lesson.map_or_else(String::new, |(_, lesson)| format!(", lesson {lesson}"));
+    format!("{sps:.0} steps/s, return {current}{lesson}")
 }
 
 /// Reports it if actions of a measured player were clipped.

@@ -21,7 +21,7 @@ use playbot_harness::{
     eval::{EvalPlan, Player},
     game::Game,
     games::Games,
-    held_out::{HeldOut, KnownLevels, seen_by_training},
+    held_out::{HeldOut, KnownLevels},
     sealed_file::write_atomically,
 };
 use playbot_learner::{Dataset, DeviceKind, SeenLevels, SkillModel, disk};
@@ -188,7 +188,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
 
 /// Finds the held-out levels of a layout that the trainings or the recordings show, and reports how many they are.
 fn known_levels(game: &dyn Game, experiment: &Experiment, skills: &SkillModel) -> KnownLevels {
-    let mut seen = seen_by_training(game, &experiment.train);
+    let mut seen = experiment.seen_by_training(game);
     seen.extend(skills.demos().unwrap_or(&SeenLevels::default()));
     let held_out = HeldOut::new(game, &experiment.test);
     let known = progress::comparing(|progress| held_out.seen_in(&seen, progress));

@@ -15,7 +15,13 @@ use bevy_playbot::{
     engine::{flush_unfinished, repeated_episodes},
 };
 use playbot_harness::{
-    demo::demonstration::DemonstrationPlan, game::Game, games::Games, held_out::HeldOut, prelude::*,
+    demo::demonstration::DemonstrationPlan,
+    game::Game,
+    games::Games,
+    held_out::HeldOut,
+    prelude::*,
+    randomise::{Factors, Randomise},
+    worlds::check_randomised,
 };
 use playbot_learner::disk;
 use playbot_report::counted;
@@ -66,6 +72,10 @@ pub struct Args {
     /// Random seed of the noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Multiply a number of the game by a factor that each level draws, by its path and the range of factors, such as
+    /// Gravity.0=0.8..1.2 (repeatable). The recording keeps the values, and replays set them.
+    #[arg(long, value_name = "PATH=FACTORS", value_parser = randomised)]
+    randomise: Vec<(String, Factors)>,
     /// Keep the observation vectors too. The file is larger, and replays restore them anyway.
     #[arg(long)]
     observations: bool,
@@ -83,6 +93,16 @@ fn warn_of_pupils(player: &LoadedPlayer) {
             "the player has learned from {seen}: hold none of these out from learners of its recordings, which do not note them"
         );
     }
+}
+
+/// Parses `PATH=LEAST..MOST`.
+fn randomised(text: &str) -> Result<(String, Factors), String> {
+    let (path, factors) = text.rsplit_once('=').ok_or("write PATH=FACTORS, such as Gravity.0=0.8..1.2")?;
+    Ok((path.trim().to_owned(), factors.trim().parse::<Factors>().map_err(|error| error.to_string())?))
+}
+
+fn randomised_paths(paths: &[(String, Factors)]) -> Randomise {
+    paths.iter().fold(Randomise::default(), |all, (path, factors)| all.with(path.clone(), *factors))
 }
 
 pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
@@ -115,7 +135,9 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         seed: args.seed,
         steps: args.steps,
         keep_observations: args.observations,
+        randomise: randomised_paths(&args.randomise),
     };
+    check_randomised(&plan.randomise, game, &levels.mode, levels.first)?;
     let mut header = plan.header(game);
     if let Some(chosen) = &chosen_player {
         header.demonstrator.clone_from(&chosen.name);

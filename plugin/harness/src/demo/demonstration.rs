@@ -2,7 +2,7 @@
 //!
 //! ```no_run
 //! use bevy_playbot::demo::file::DemoWriter;
-//! use playbot_harness::{demo::demonstration::DemonstrationPlan, prelude::*};
+//! use playbot_harness::{demo::demonstration::DemonstrationPlan, prelude::*, randomise::Randomise};
 //! # fn record(game: &dyn Game) -> Result<(), Box<dyn std::error::Error>> {
 //! let plan = DemonstrationPlan {
 //!     mode: "easy".to_owned(),
@@ -11,6 +11,7 @@
 //!     seed: 1,
 //!     steps: None,
 //!     keep_observations: false,
+//!     randomise: Randomise::default(),
 //! };
 //! let writer = DemoWriter::create("easy.demo", plan.header(game))?;
 //! let (mut world, agent) = plan.build_world(game, writer);
@@ -25,6 +26,7 @@
 use crate::{
     eval::Player,
     game::Game,
+    randomise::Randomise,
     worlds::{build_observing_world, build_world},
 };
 use bevy::prelude::*;
@@ -53,6 +55,8 @@ pub struct DemonstrationPlan {
     pub steps: Option<u64>,
     /// True if the recording keeps the observation vectors. Without them a replay restores them.
     pub keep_observations: bool,
+    /// Values of the game that each level draws anew. The recording keeps them.
+    pub randomise: Randomise,
 }
 
 impl DemonstrationPlan {
@@ -64,7 +68,7 @@ impl DemonstrationPlan {
         if self.keep_observations {
             header.observation_names = game.observation().names;
         }
-        header
+        if self.randomise.is_empty() { header } else { header.with_randomised_values() }
     }
 
     /// Builds a World with an agent that the demonstrator plays, recorded by `writer` in each tick. After the last
@@ -105,6 +109,7 @@ impl DemonstrationPlan {
 
     /// Makes the agent play the levels and `writer` record it.
     fn record(&self, world: &mut World, agent: Entity, control: Control, writer: DemoWriter) {
+        self.randomise.install(world);
         let recorder = Recorder::new(writer);
         let (recorder, levels) = match self.steps {
             Some(steps) => (recorder.with_step_limit(steps), LevelQueue::rounds(self.levels.clone())),

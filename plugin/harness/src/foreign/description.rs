@@ -13,15 +13,14 @@ use crate::{
         input,
         input::Input,
         levels::{LevelFromFile, LevelParts, PlayedMode},
-        observe,
-        paths::ObservedPath,
-        restart,
+        observe, restart,
         runtime::{
             Baseline, Foreign, ForeignCell, LevelSeed, PlayedAgent, PositionAndHeight, ReaderFactory, Sensor,
             SystemFactory,
         },
         snapshot::{Part, SnapshotParts, add_whole},
     },
+    reflected_path::ReflectedPath,
 };
 use bevy::{
     app::{MainScheduleOrder, PluginGroupBuilder},
@@ -145,7 +144,7 @@ impl Description {
         match &self.observe {
             Some(system) => Sensor::System(system.make()),
             None if self.paths.is_empty() => Sensor::Nothing,
-            None => Sensor::Paths(self.paths.iter().map(|path| ObservedPath::new(path)).collect()),
+            None => Sensor::Paths(self.paths.iter().map(|path| ReflectedPath::new(path)).collect()),
         }
     }
 

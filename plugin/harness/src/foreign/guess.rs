@@ -5,8 +5,8 @@
 //! [`PLAYER_NAMES`]. Where several entities match, the guess is not certain, and there is none.
 
 use crate::{
-    foreign::paths::{component_of, is_ours},
     game::GuessedPosition,
+    reflected_path::{component_of, is_ours},
 };
 use bevy::{
     ecs::{archetype::Archetype, component::ComponentId},

@@ -5,13 +5,13 @@ use crate::{
     detector::LevelProof,
     foreign::{
         ForeignGame,
-        paths::component_of,
         runtime::{
             Baseline, ForeignCell, OwnedSystem, ReaderFactory, Sensor, SystemFactory, note, playing_agents,
             with_foreign,
         },
     },
     game::{GuessedPosition, StateTools},
+    reflected_path::component_of,
     worlds::hash_with_agent,
 };
 use bevy::{

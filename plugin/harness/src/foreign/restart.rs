@@ -10,6 +10,7 @@ use crate::{
         snapshot::{note_frame, note_start, queued, ticks},
     },
     level_files::LevelDesigns,
+    randomise,
 };
 use bevy::{ecs::change_detection::Tick, prelude::*};
 use bevy_playbot::{
@@ -41,6 +42,7 @@ fn begin(world: &mut World, agent: Entity, level: u64) {
         }
     }
     begin_agents_along(world, level);
+    randomise::own_values(world);
     with_foreign(world, agent, |world, foreign| {
         let designs = world.get_resource::<LevelDesigns>();
         let (seed, file) = level_ahead(&foreign.game, designs, level)?;
@@ -53,6 +55,7 @@ fn begin(world: &mut World, agent: Entity, level: u64) {
         if let Some(system) = &mut foreign.level {
             system.demand(world)?;
         }
+        randomise::set_values(world, level, &active_agents(world))?;
         foreign.frames = 0;
         foreign.rewards().for_each(|part| part.last = None);
         Ok(())

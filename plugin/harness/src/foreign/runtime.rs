@@ -2,8 +2,9 @@
 
 use crate::{
     detector::LevelProof,
-    foreign::{ForeignGame, clocks::ClockSettings, guess::PlayerGuess, paths::ObservedPath},
+    foreign::{ForeignGame, clocks::ClockSettings, guess::PlayerGuess},
     game::Snapshot,
+    reflected_path::ReflectedPath,
 };
 use bevy::{
     ecs::{
@@ -50,7 +51,7 @@ pub(super) struct AgentPlace(pub(super) usize);
 /// The source of the observation.
 pub(super) enum Sensor {
     System(OwnedSystem<Vec<f32>>),
-    Paths(Vec<ObservedPath>),
+    Paths(Vec<ReflectedPath>),
     Nothing,
 }
 

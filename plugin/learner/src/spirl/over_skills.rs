@@ -62,11 +62,12 @@ impl OverSkills {
     }
 
     /// Learns π(z | s) from a rollout of ticks, and returns the metrics under names that differ from those of the
-    /// acting policy.
+    /// acting policy. PPO puts the sizes of its advantages into the rows in which skills were drawn.
     pub(super) fn learn(
         &mut self,
         config: &SpirlConfig,
         rollout: &Rollout,
+        advantage_sizes: &mut Vec<Option<f32>>,
     ) -> Result<Vec<(&'static str, f64)>, LearnError> {
         let (gamma, skill_interval) = (self.discount_of_tick(), self.teacher().config.skill_interval);
         let tanh = self.teacher().description.config.tanh_latent;
@@ -81,7 +82,7 @@ impl OverSkills {
             }
             Self::Ppo(learner) => {
                 let rewards = scaled(learner.base.rewards.as_mut(), gamma, rollout)?;
-                let SkillRollout { rows: mut skills, discounts } =
+                let SkillRollout { rows: mut skills, discounts, drawn_at } =
                     skill_rollout(rollout, &rewards, gamma, skill_interval)?;
                 if let (true, Actions::Continuous { values, .. }) = (tanh, &mut skills.actions) {
                     // PPO does not squash: its actions are the normal numbers whose tanh the decoder reads.
@@ -94,6 +95,11 @@ impl OverSkills {
                 let metrics = learner.update(&skills);
                 learner.base.rewards = normalizer;
                 let metrics = metrics?;
+                advantage_sizes.clear();
+                advantage_sizes.resize(rollout.rows(), None);
+                for (&row, &size) in drawn_at.iter().zip(learner.advantage_sizes()) {
+                    advantage_sizes[row] = size;
+                }
                 // While only the critic learns, the policy stays the same whatever that costs.
                 if let (Some(kl), Some(teacher), false) = (metrics.decoder_kl, &mut learner.base.teacher, is_warming_up)
                 {

@@ -10,9 +10,9 @@ use crate::{
     demo::file::{
         episode::{Decider, DemoEnd, DemoEpisode, EpisodeActions},
         error::EpisodeFault,
-        header::{DemoActions, DemoHeader, LEVEL_FILES_FORMAT},
+        header::{DemoActions, DemoHeader, LEVEL_FILES_FORMAT, RANDOMISED_FORMAT},
     },
-    level::LevelFile,
+    level::{LevelFile, RandomisedValue},
 };
 
 /// Encodings of a list; the shorter one is used.
@@ -54,7 +54,7 @@ macro_rules! scalar {
     )*};
 }
 
-scalar!(u8, u16, u32, u64, f32);
+scalar!(u8, u16, u32, u64, f32, f64);
 
 /// Writes the values one after the other, without their number.
 pub(super) fn put_plain<T: Scalar>(values: &[T], out: &mut Vec<u8>) {
@@ -199,6 +199,7 @@ pub(super) fn payload(frame: &[u8]) -> Option<&[u8]> {
 /// | observation width | `u32` |
 /// | observations | `steps` × width × `f32` |
 /// | level file | from format 2 on: `u32` bytes of its path, 0 for none; the path in UTF-8; the level's hash, `u64` |
+/// | randomised values | from format 3 on: `u32` values; for each `u32` bytes of its path, the path in UTF-8, and `f64` |
 ///
 /// All numbers are little-endian. A list is one byte and then the shorter of two forms: the plain values (byte 0), or
 /// runs (byte 1). A run is a count (seven bits a byte, lowest first) and a value. The hashes come first: they bound the
@@ -240,7 +241,41 @@ pub(super) fn encode_payload(
     put_list(&episode.deciders.iter().map(|&d| decider_code(d)).collect::<Vec<_>>(), out);
     put_plain(&[header.observation_names.len() as u32], out);
     put_plain(&episode.observations, out);
-    put_level_file(episode.level_file.as_ref(), header, out)
+    put_level_file(episode.level_file.as_ref(), header, out)?;
+    put_randomised(&episode.randomised, header, out)
+}
+
+fn put_randomised(values: &[RandomisedValue], header: &DemoHeader, out: &mut Vec<u8>) -> Result<(), EpisodeFault> {
+    if header.format < RANDOMISED_FORMAT {
+        let Some(RandomisedValue { path, .. }) = values.first() else { return Ok(()) };
+        let format = header.format;
+        return Err(malformed(format!(
+            "`{path}` was drawn for the level, which recordings in format {format} cannot say"
+        )));
+    }
+    let length = |length: usize| u32::try_from(length).map_err(|_| malformed("too many randomised values"));
+    put_plain(&[length(values.len())?], out);
+    for RandomisedValue { path, value } in values {
+        put_plain(&[length(path.len())?], out);
+        out.extend_from_slice(path.as_bytes());
+        put_plain(&[*value], out);
+    }
+    Ok(())
+}
+
+fn randomised(cursor: &mut Cursor, header: &DemoHeader) -> Result<Vec<RandomisedValue>, EpisodeFault> {
+    let mut values = Vec::new();
+    if header.format < RANDOMISED_FORMAT {
+        return Ok(values);
+    }
+    let what = "the randomised values";
+    for _ in 0..cursor.scalar::<u32>(what)? {
+        let length = cursor.scalar::<u32>(what)? as usize;
+        let path = String::from_utf8(cursor.plain(length, what)?);
+        let path = path.map_err(|_| malformed("the path of a randomised value is not text"))?;
+        values.push(RandomisedValue { path, value: cursor.scalar(what)? });
+    }
+    Ok(values)
 }
 
 fn put_level_file(file: Option<&LevelFile>, header: &DemoHeader, out: &mut Vec<u8>) -> Result<(), EpisodeFault> {
@@ -305,10 +340,12 @@ pub(super) fn decode(payload: &[u8], header: &DemoHeader) -> Result<DemoEpisode,
     let count = steps.checked_mul(width).ok_or_else(|| malformed("too many observation values"))?;
     let observations = cursor.plain(count, "observation values")?;
     let level_file = level_file(&mut cursor, header)?;
+    let randomised = randomised(&mut cursor, header)?;
     if !cursor.0.is_empty() {
         return Err(malformed(format!("{} bytes after the last field", cursor.0.len())));
     }
-    let episode = DemoEpisode { level_seed, level_file, actions, rewards, state_hashes, deciders, end, observations };
+    let episode =
+        DemoEpisode { level_seed, level_file, randomised, actions, rewards, state_hashes, deciders, end, observations };
     episode.check(header)?;
     Ok(episode)
 }
@@ -400,6 +437,21 @@ mod tests {
         assert_eq!(decode(&bytes, &header()), Ok(plain));
         let refused = coded(&drawn, &header()).expect_err("format 1").to_string();
         assert!(refused.contains("levels/höhle.json") && refused.contains("format 1"), "{refused}");
+    }
+
+    #[test]
+    fn randomised_values_are_kept_from_format_3_on() {
+        let drawn = |path: &str, value| RandomisedValue { path: path.to_owned(), value };
+        let values = vec![drawn("Gravity.0", -9.5), drawn("Player.Speed.0", 0.1 + 0.2)];
+        let episode = DemoEpisode { randomised: values, ..episode(3, 5) };
+        let with_values = header().with_level_files().with_randomised_values();
+        let bytes = coded(&episode, &with_values).expect("writable");
+        assert_eq!(decode(&bytes, &with_values).as_ref(), Ok(&episode));
+        assert!((1..bytes.len()).all(|end| decode(&bytes[..end], &with_values).is_err()), "it is cut off");
+        let refused = coded(&episode, &header().with_level_files()).expect_err("format 2").to_string();
+        assert!(refused.contains("`Gravity.0`") && refused.contains("format 2"), "{refused}");
+        let endless = DemoEpisode { randomised: vec![drawn("Gravity.0", f64::NAN)], ..episode };
+        assert!(coded(&endless, &with_values).expect_err("no number").to_string().contains("Gravity.0"));
     }
 
     #[test]

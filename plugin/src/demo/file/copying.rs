@@ -146,10 +146,10 @@ impl MergeReport {
 
 /// Returns a hash of what was played: the level, and each tick without its decider.
 fn hash_of_play(episode: &DemoEpisode) -> u64 {
-    let DemoEpisode { level_seed, level_file, actions, rewards, state_hashes, deciders: _, end, observations: _ } =
-        episode;
+    let DemoEpisode { level_seed, level_file, randomised, actions, rewards, state_hashes, end, .. } = episode;
     let mut hasher = DefaultHasher::new();
     (level_seed, level_file.as_ref().map(|file| file.hash), state_hashes).hash(&mut hasher);
+    randomised.iter().for_each(|drawn| (&drawn.path, drawn.value.to_bits()).hash(&mut hasher));
     rewards.iter().for_each(|reward| reward.to_bits().hash(&mut hasher));
     match actions {
         EpisodeActions::Discrete(list) => list.hash(&mut hasher),

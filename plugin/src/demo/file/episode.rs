@@ -5,7 +5,7 @@ use crate::{
         error::EpisodeFault,
         header::{DemoActions, DemoHeader},
     },
-    level::LevelFile,
+    level::{LevelFile, RandomisedValue},
 };
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -75,6 +75,9 @@ pub struct DemoEpisode {
     /// The file of the level, where levels are files. Its level number may have changed since.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub level_file: Option<LevelFile>,
+    /// Values of the game that were drawn for the level.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub randomised: Vec<RandomisedValue>,
     /// The action of each tick.
     pub actions: EpisodeActions,
     /// The reward of each tick, `[steps]`.
@@ -96,6 +99,7 @@ impl DemoEpisode {
         Self {
             level_seed,
             level_file: None,
+            randomised: Vec::new(),
             actions: match actions {
                 DemoActions::Discrete(_) => EpisodeActions::Discrete(Vec::new()),
                 DemoActions::Continuous(dim) => EpisodeActions::Continuous { dim, values: Vec::new() },
@@ -175,6 +179,11 @@ impl DemoEpisode {
                 };
                 return Err(EpisodeFault::ActionKind { found, expected: expected.to_string() });
             }
+        }
+        if let Some(RandomisedValue { path, value }) = self.randomised.iter().find(|drawn| !drawn.value.is_finite()) {
+            return Err(EpisodeFault::Malformed(format!(
+                "its value of `{path}` is {value}, which is no finite number"
+            )));
         }
         finite("the reward", &self.rewards, 1)?;
         finite("an observation value", &self.observations, width)

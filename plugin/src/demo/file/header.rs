@@ -4,13 +4,16 @@ use crate::demo::file::error::DemoFault;
 use serde::{Deserialize, Serialize};
 
 /// Newest format that this version of the crate reads and writes.
-pub const DEMO_FORMAT: u32 = LEVEL_FILES_FORMAT;
+pub const DEMO_FORMAT: u32 = RANDOMISED_FORMAT;
 
 /// Format of recordings that name no level files. Written where possible, since older programs read it too.
 const PLAIN_FORMAT: u32 = 1;
 
 /// First format in which every episode names its level file.
 pub(super) const LEVEL_FILES_FORMAT: u32 = 2;
+
+/// First format in which every episode names the values that were drawn for its level.
+pub(super) const RANDOMISED_FORMAT: u32 = 3;
 
 /// The kind and number of actions of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -43,7 +46,7 @@ impl std::fmt::Display for DemoActions {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DemoHeader {
-    /// Format of the file: 1, or 2 where levels are files.
+    /// Format of the file: 1, 2 where levels are files, or 3 where levels draw values of the game.
     pub format: u32,
     /// Name of the game.
     pub game: String,
@@ -85,7 +88,12 @@ impl DemoHeader {
 
     /// Changes the format to that of level files, which the episodes name.
     pub fn with_level_files(self) -> Self {
-        Self { format: LEVEL_FILES_FORMAT, ..self }
+        Self { format: self.format.max(LEVEL_FILES_FORMAT), ..self }
+    }
+
+    /// Changes the format to that of levels that draw values of the game, which the episodes name.
+    pub fn with_randomised_values(self) -> Self {
+        Self { format: RANDOMISED_FORMAT, ..self }
     }
 
     /// Checks the values.

@@ -18,6 +18,7 @@ pub(super) fn episode(level_seed: u64, steps: usize) -> DemoEpisode {
     DemoEpisode {
         level_seed,
         level_file: None,
+        randomised: Vec::new(),
         actions: EpisodeActions::Discrete((0..steps).map(|t| (value(t) % 4) as u32).collect()),
         rewards: (0..steps).map(|t| if t + 1 == steps { 10.0 } else { 0.0 }).collect(),
         state_hashes: (0..steps).map(|t| value(t) as u32).collect(),

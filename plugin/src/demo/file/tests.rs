@@ -244,7 +244,8 @@ prop_compose! {
             DemoActions::Discrete(_) => EpisodeActions::Discrete(discrete),
             DemoActions::Continuous(dim) => EpisodeActions::Continuous { dim, values },
         };
-        DemoEpisode { level_seed, level_file: None, actions, rewards, state_hashes, deciders, end, observations }
+        let randomised = Vec::new();
+        DemoEpisode { level_seed, level_file: None, randomised, actions, rewards, state_hashes, deciders, end, observations }
     }
 }
 

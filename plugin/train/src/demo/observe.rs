@@ -20,6 +20,7 @@ use playbot_harness::{
     demo::{ReplayedEpisodes, VerifyError},
     game::Game,
     parallel::on_threads,
+    randomise::follow_recordings,
     sensors::GameSensors,
     worlds::{at_most, build_observing_world},
 };
@@ -206,7 +207,9 @@ pub fn observe_replays(
     threads: usize,
     progress: &(impl Fn(u64) + Sync),
 ) -> Result<Vec<ObservedEpisode>, ReplayError> {
-    let side_by_side = at_most(game, SIDE_BY_SIDE);
+    // Values that a level has drawn are those of its World.
+    let draws = jobs.iter().any(|(_, replay)| !replay.episode().randomised.is_empty());
+    let side_by_side = if draws { 1 } else { at_most(game, SIDE_BY_SIDE) };
     let threads = threads.clamp(1, jobs.len().div_ceil(side_by_side).max(1));
     let mut shares: Vec<Vec<Job>> = vec![Vec::new(); threads];
     for (i, job) in jobs.into_iter().enumerate() {
@@ -268,6 +271,9 @@ impl ReplayWorld {
 
     /// Gives an agent the next episode, or makes it idle if there is none.
     fn begin(&mut self, agent: usize, job: Option<Job>) {
+        if job.as_ref().is_some_and(|(_, replay)| !replay.episode().randomised.is_empty()) {
+            follow_recordings(&mut self.world);
+        }
         let mut entity = self.world.entity_mut(self.agents[agent]);
         let Some((id, replay)) = job else {
             entity.insert(Control::Idle);

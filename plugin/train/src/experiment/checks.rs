@@ -45,7 +45,8 @@ impl Experiment {
             self.checkpoints.check_ranges(),
             self.study.check_ranges(),
         ];
-        own.into_iter().collect::<Result<(), _>>().map_err(out_of_range)?;
+        let of_levels = [self.curriculum.check_ranges(), self.levels.check_ranges()];
+        own.into_iter().chain(of_levels).collect::<Result<(), _>>().map_err(out_of_range)?;
         let of_image =
             |error| ExperimentError::Settings { key: Some("image".to_owned()), words: format!("`image`: {error}") };
         self.image.check().map_err(of_image)?;
@@ -56,6 +57,7 @@ impl Experiment {
         self.spirl.validate().map_err(settings)?;
         self.rlpd.validate().map_err(settings)?;
         self.check_rollout()?;
+        self.check_lessons()?;
         if self.algorithm.learns_from_demos() {
             self.recordings()?;
         }
@@ -217,6 +219,7 @@ impl Experiment {
     pub fn check_levels(&self, game: &dyn Game) -> Result<(), ExperimentError> {
         self.check_train(game)?;
         self.check_test(game)?;
+        self.check_lesson_levels(game)?;
         let held_out = HeldOut::new(game, &self.test);
         let (train, test) = (Box::new(self.train.clone()), Box::new(self.test.clone()));
         match held_out.first_of(&self.train) {
@@ -393,8 +396,10 @@ impl Experiment {
         self.check_threads(self.arrangement(game), room.threads)
     }
 
-    fn arrangement(&self, game: &dyn Game) -> Arrangement {
-        Arrangement::of_agents(game, self.arenas, self.worlds)
+    /// Returns the Worlds of a training: one for each arena if levels draw values, which are those of a World.
+    pub(crate) fn arrangement(&self, game: &dyn Game) -> Arrangement {
+        let shared = Arrangement::of_agents(game, self.arenas, self.worlds);
+        if self.randomise.is_empty() { shared } else { shared.apart(game) }
     }
 
     fn training_parts(&self, game: &dyn Game, sizes: &Sizes) -> Vec<MemoryPart> {
@@ -653,6 +658,14 @@ pub enum ExperimentError {
         /// A mode that the game has.
         example: &'static str,
     },
+    /// The game does not have a lesson's mode or levels.
+    #[error("`curriculum.lessons` has {levels}: {source}")]
+    Lesson {
+        /// The lesson.
+        levels: Box<LevelSplit>,
+        /// The error of the mode.
+        source: Box<ModeError>,
+    },
     /// Training needs more memory than the machine has.
     #[error(transparent)]
     Memory(#[from] MemoryError),
@@ -689,6 +702,7 @@ impl ExperimentError {
             Self::Mode { key, .. } | Self::Value { key, .. } => vec![key],
             // Keys are named between backticks.
             Self::Memory(MemoryError { keys, .. }) => keys.split('`').skip(1).step_by(2).collect(),
+            Self::Lesson { .. } => vec!["curriculum.lessons"],
             Self::NoDemos => vec!["algorithm"],
             Self::Settings { key, .. } => key.as_deref().into_iter().collect(),
         }

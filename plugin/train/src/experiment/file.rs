@@ -29,7 +29,7 @@ use playbot_harness::{
 use playbot_learner::settings::Reader;
 use ron::{Options, error::SpannedError, extensions::Extensions, value::RawValue};
 use serde::{
-    Deserialize, Deserializer,
+    Deserialize, Deserializer, Serialize,
     de::{Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor},
 };
 use std::{
@@ -227,6 +227,9 @@ fn gather_base(name: &str, reading: &mut Reading, origin: &Origin) -> Result<Key
 /// Keys with paths: recordings, and levels that may be files.
 const PATHS: [&str; 3] = ["demos", "train", "test"];
 
+/// Key of the lessons, whose levels may be files too.
+const LESSONS: &str = "curriculum.lessons";
+
 /// Returns true if a folder is the current one.
 fn is_current(folder: &Path) -> bool {
     folder.as_os_str().is_empty()
@@ -285,6 +288,7 @@ impl Keys {
                 value.text = ron::to_string(&found).map_err(|error| refuse(error.to_string()))?;
             }
         }
+        self.start_lessons_in(folder)?;
         let Some(value) = self.0.get_mut("variants") else { return Ok(()) };
         let Ok(mut variants) = reader().from_str::<Vec<Variant>>(&value.text) else { return Ok(()) };
         let refuse = |message: String| value.origin.error((1, 1), message);
@@ -302,6 +306,34 @@ impl Keys {
         }
         if is_changed {
             value.text = ron::to_string(&variants).map_err(|error| refuse(error.to_string()))?;
+        }
+        Ok(())
+    }
+}
+
+/// A lesson whose levels are a text: files in it are looked for later.
+#[derive(Serialize, Deserialize)]
+struct WrittenLesson {
+    levels: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    success: Option<f64>,
+}
+
+impl Keys {
+    /// Puts `folder` in front of the level files of lessons that lie there, as [`start_in`](Self::start_in) does.
+    fn start_lessons_in(&mut self, folder: &Path) -> Result<(), ConfigError> {
+        let Some(value) = self.0.get_mut(LESSONS) else { return Ok(()) };
+        // Values of other types are refused when they are parsed.
+        let Ok(mut lessons) = reader().from_str::<Vec<WrittenLesson>>(&value.text) else { return Ok(()) };
+        let refuse = |message: String| value.origin.error((1, 1), message);
+        let mut is_changed = false;
+        for lesson in &mut lessons {
+            if let Some(found) = beside(folder, LESSONS, &lesson.levels).map_err(refuse)? {
+                (lesson.levels, is_changed) = (found, true);
+            }
+        }
+        if is_changed {
+            value.text = ron::to_string(&lessons).map_err(|error| refuse(error.to_string()))?;
         }
         Ok(())
     }

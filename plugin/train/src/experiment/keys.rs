@@ -184,6 +184,7 @@ fn kind(key: &str) -> String {
         Some('"') => "text in quotes".to_owned(),
         Some('[') if example.len() > "[]".len() => format!("a list in square brackets such as {example}"),
         Some('[') => "a list in square brackets".to_owned(),
+        Some('{') => format!("values by their keys in curly brackets such as {example}"),
         Some('(') => format!("values in round brackets such as {example}"),
         Some('0'..='9' | '-') if example.contains(['.', 'e']) => format!("a number such as {example}"),
         Some('0'..='9') => format!("a whole number such as {example}"),

@@ -70,6 +70,7 @@ fn plain_kind(type_name: &str) -> &'static str {
         "f64" => "number",
         "(f64, f64)" => "two numbers",
         "u32" | "u64" | "usize" => "whole number",
+        "Randomise" => "ranges of factors by path",
         "Vec<u64>" | "Vec<usize>" => "list of whole numbers",
         name if name.starts_with("Vec<") => "list",
         _ => "text",

@@ -128,19 +128,25 @@ fn observations(header: &DemoHeader) -> String {
 
 fn show_episode(index: usize, episode: &DemoEpisode, as_json: bool) -> Result<(), CliError> {
     if as_json {
-        return print_line(json!({
+        let mut line = json!({
             "episode": index, "level": episode.level_seed, "level_file": episode.level_file.as_ref().map(level_file), "steps": episode.len(),
             "return": episode.episode_return(), "end": episode.end, "steps_by_decider": episode.steps_by_decider(),
-        }));
+        });
+        if !episode.randomised.is_empty() {
+            line["randomised"] = json!(episode.randomised);
+        }
+        return print_line(line);
     }
+    let drawn: Vec<String> = episode.randomised.iter().map(ToString::to_string).collect();
     print_line(format!(
-        "episode {index:>4}  level {:>6}  {:>4} steps  return {:>6.2}  {:<11}  {}{}",
+        "episode {index:>4}  level {:>6}  {:>4} steps  return {:>6.2}  {:<11}  {}{}{}",
         episode.level_seed,
         episode.len(),
         episode.episode_return(),
         end(episode.end),
         deciders("by", &episode.steps_by_decider()),
         episode.level_file.as_ref().map_or_else(String::new, |file| format!("  on {}", file.path)),
+        if drawn.is_empty() { String::new() } else { format!("  with {}", drawn.join(", ")) },
     ))
 }
 

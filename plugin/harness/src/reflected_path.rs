@@ -1,4 +1,4 @@
-//! Observations by the paths of their values.
+//! Numbers of a World by their paths: read for observations, and set for levels that draw them.
 
 use bevy::{
     ecs::component::ComponentId,
@@ -8,10 +8,13 @@ use bevy::{
 use thiserror::Error;
 
 /// A number in the World: `Marker.Component.field` or `Resource.field`.
-pub(super) struct ObservedPath {
+pub(crate) struct ReflectedPath {
     path: String,
     found: Option<Found>,
 }
+
+/// The fault of a path whose component has gone.
+const GONE: &str = "leads to a component that is not there";
 
 /// The meaning of a path in this World.
 struct Found {
@@ -39,9 +42,14 @@ pub struct PathError {
     pub why: String,
 }
 
-impl ObservedPath {
-    pub(super) fn new(path: &str) -> Self {
+impl ReflectedPath {
+    pub(crate) fn new(path: &str) -> Self {
         Self { path: path.to_owned(), found: None }
+    }
+
+    /// Returns the path as it is written.
+    pub(crate) fn text(&self) -> &str {
+        &self.path
     }
 
     /// Returns the current number.
@@ -49,21 +57,40 @@ impl ObservedPath {
     /// # Errors
     ///
     /// [`PathError`] if the path has no value, several, or one that is not a number.
-    pub(super) fn read(&mut self, world: &mut World) -> Result<f32, PathError> {
+    pub(crate) fn read(&mut self, world: &mut World) -> Result<f32, PathError> {
         let path = self.path.clone();
         self.look_up(world).map_err(|why| PathError { path, why })
     }
 
     fn look_up(&mut self, world: &mut World) -> Result<f32, String> {
+        let (entity, found) = self.find(world)?;
+        let value = found.reflect.reflect(world.entity(entity)).ok_or(GONE)?;
+        let at = value.reflect_path(found.field.as_str()).map_err(|error| format!("leads nowhere: {error}"))?;
+        number(at).ok_or_else(|| format!("leads to a {}, which is not a number", at.reflect_short_type_path()))
+    }
+
+    /// Changes the number, and returns it as it was and as it is. A whole number is rounded, and none leaves its range.
+    ///
+    /// # Errors
+    ///
+    /// In words: the path has no value, several, or one that is not a number. A truth value is none.
+    pub(crate) fn change(&mut self, world: &mut World, new: impl FnOnce(f64) -> f64) -> Result<(f64, f64), String> {
+        let (entity, found) = self.find(world)?;
+        let mut entity = world.entity_mut(entity);
+        let mut value = found.reflect.reflect_mut(&mut entity).ok_or(GONE)?;
+        let at = value.reflect_path_mut(found.field.as_str()).map_err(|error| format!("leads nowhere: {error}"))?;
+        let name = at.reflect_short_type_path().to_owned();
+        change_number(at, new).ok_or_else(|| format!("leads to a {name}, which is not a number"))
+    }
+
+    /// Returns the entity and what is read of it.
+    fn find(&mut self, world: &mut World) -> Result<(Entity, &Found), String> {
         let found = match self.found.take() {
             Some(found) => found,
             None => Found::new(&self.path, world)?,
         };
-        let found = self.found.insert(found);
-        let entity = found.entity(world)?;
-        let value = found.reflect.reflect(world.entity(entity)).ok_or("leads to a component that is not there")?;
-        let at = value.reflect_path(found.field.as_str()).map_err(|error| format!("leads nowhere: {error}"))?;
-        number(at).ok_or_else(|| format!("leads to a {}, which is not a number", at.reflect_short_type_path()))
+        let found = &*self.found.insert(found);
+        Ok((found.entity(world)?, found))
     }
 }
 
@@ -117,7 +144,7 @@ fn reflected(world: &mut World, name: &str) -> Option<(ComponentId, ReflectCompo
 
 /// Returns a component by its short name: from the type registry, or by the name that Bevy keeps with its feature
 /// `debug`.
-pub(super) fn component_of(world: &World, name: &str) -> Option<ComponentId> {
+pub(crate) fn component_of(world: &World, name: &str) -> Option<ComponentId> {
     let components = world.components();
     let by_type = |may_be_ours: bool| {
         let registry = world.get_resource::<AppTypeRegistry>()?.read();
@@ -141,7 +168,7 @@ fn registered<'a>(registry: &'a TypeRegistry, name: &str) -> Option<&'a TypeRegi
 }
 
 /// Returns whether a type belongs to the plugin.
-pub(super) fn is_ours(path: &str) -> bool {
+pub(crate) fn is_ours(path: &str) -> bool {
     ["bevy_playbot::", "playbot::", "playbot_harness::", "playbot_mutation::", "playbot_test::", "playbot_train::"]
         .iter()
         .any(|of| path.starts_with(of))
@@ -161,4 +188,21 @@ fn number(value: &dyn PartialReflect) -> Option<f32> {
     }
     one_of!(f32, f64, i8, i16, i32, i64, isize, u8, u16, u32, u64, usize);
     value.try_downcast_ref::<bool>().map(|value| f32::from(u8::from(*value)))
+}
+
+/// Changes a number of any kind, and returns it as it was and as it is.
+fn change_number(value: &mut dyn PartialReflect, new: impl FnOnce(f64) -> f64) -> Option<(f64, f64)> {
+    macro_rules! one_of {
+        ($($kind:ty),*; $round:expr) => {
+            $(if let Some(value) = value.try_downcast_mut::<$kind>() {
+                let before = *value as f64;
+                // A cast stops at the ends of the type's range.
+                *value = $round(new(before)) as $kind;
+                return Some((before, *value as f64));
+            })*
+        };
+    }
+    one_of!(f32, f64; |number: f64| number);
+    one_of!(i8, i16, i32, i64, isize, u8, u16, u32, u64, usize; f64::round);
+    None
 }
