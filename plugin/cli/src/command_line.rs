@@ -9,9 +9,9 @@ use crate::{
     progress,
     progress::interrupt,
     verbs::{
-        bench, bisect, bugs, completions, config, demo, doctor, eval, explore, eyes, history, init, learn_skills,
-        level, levels, play, policy, quickstart, record, replay, report, review, runs, skills, study, teach, test,
-        trace, train, view, watch,
+        bench, bisect, bugs, completions, config, demo, diagnose, doctor, eval, explore, eyes, history, init,
+        learn_skills, level, levels, play, policy, quickstart, record, replay, report, review, runs, skills, study,
+        teach, test, trace, train, view, watch,
     },
 };
 use bevy_playbot::unknown_name::{nearest, question};
@@ -89,6 +89,7 @@ enum Verb {
     Teach(teach::Args),
     LearnSkills(learn_skills::Args),
     Train(train::Args),
+    Diagnose(diagnose::Args),
     Study(study::Args),
     Config(config::Args),
     Eval(eval::Args),
@@ -279,6 +280,7 @@ fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
         Verb::LearnSkills(args) => args.compute.threads(),
         Verb::Teach(args) => args.compute.threads(),
         Verb::Train(args) => args.compute.threads(),
+        Verb::Diagnose(args) => args.compute.threads(),
         Verb::Study(args) => args.compute.threads(),
         Verb::Eval(args) => args.compute.threads(),
         Verb::Test(args) => args.compute.threads(),
@@ -302,6 +304,7 @@ fn run_on_threads(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
         Verb::LearnSkills(args) => learn_skills::run(args, games),
         Verb::Teach(args) => teach::run(args, games),
         Verb::Train(args) => train::run(args, games),
+        Verb::Diagnose(args) => diagnose::run(args, games),
         Verb::Study(args) => study::run(args, games),
         Verb::Config(args) => config::run(args, games),
         Verb::Eval(args) => eval::run(args, games),

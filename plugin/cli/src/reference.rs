@@ -13,7 +13,22 @@ const GROUPS: [(&str, &[&str]); 6] = [
     ),
     ("See levels and episodes", &["level", "trace", "view", "eyes", "skills", "play"]),
     ("Record", &["record", "demo"]),
-    ("Learn", &["quickstart", "teach", "learn-skills", "train", "study", "eval", "config", "runs", "policy", "bench"]),
+    (
+        "Learn",
+        &[
+            "quickstart",
+            "teach",
+            "learn-skills",
+            "train",
+            "diagnose",
+            "study",
+            "eval",
+            "config",
+            "runs",
+            "policy",
+            "bench",
+        ],
+    ),
     ("Use the shell", &["completions"]),
 ];
 

@@ -14,12 +14,14 @@
 //!   ([`checkpoint`]), metrics ([`metrics_log`], [`tensorboard`]) and observer ([`run_observer`]).
 //! - [`policy_export`]: the one file that a game ships with.
 //! - [`lesson`]: from a recording to a policy that plays at once, and gets better.
+//! - [`diagnose`]: why a training does not learn, as findings.
 //! - [`runs`]: runs on disk, found and compared over seeds.
 //! - [`study`] and [`study_runner`]: variants of an experiment, each with every seed, and their tables.
 
 pub mod checkpoint;
 pub mod collect;
 pub mod demo;
+pub mod diagnose;
 mod error;
 pub mod experiment;
 pub mod learn_skills;

@@ -1,0 +1,218 @@
+//! Checks of whether observations decide actions, by nearest neighbours in recordings.
+
+use crate::diagnose::{
+    advice::Advice,
+    evidence::Evidence,
+    finding::{LearningFinding, Sign},
+    observation::statistics,
+    play::mean,
+};
+use bevy_playbot::action::ActionValue;
+use playbot_report::{counted, percent, readable, whole};
+use std::collections::BTreeMap;
+
+/// Most steps among which neighbours are looked for, and most of which they are.
+const STEPS: usize = 2000;
+const ASKED: usize = 400;
+
+/// Fewest pairs about which anything is said.
+const FEWEST: usize = 150;
+
+/// Largest distance between equal observations, in deviations.
+const EQUAL: f64 = 1e-4;
+
+/// Agreement beyond chance, 0 to 1, below which actions do not depend on observations.
+const NO_AGREEMENT: f64 = 0.05;
+
+/// Share of equal observations with other actions that no demonstrator has who acts by what is observed.
+const MOST_DISAGREEMENT: f64 = 0.5;
+
+/// How far the action of the nearest observation in another episode agrees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Agreement {
+    /// Pairs of steps that were compared.
+    pub pairs: usize,
+    /// Agreement beyond chance: 1 if neighbours always do the same, 0 if they agree as steps drawn at random.
+    pub beyond_chance: f64,
+    /// Agreement of steps drawn at random.
+    pub chance: f64,
+    /// Pairs whose observations are equal.
+    pub equal: usize,
+    /// Share of these whose actions differ.
+    pub differing: f64,
+}
+
+/// One recorded step with the number of its episode.
+type Step<'a> = (usize, &'a [f32], &'a ActionValue);
+
+/// Compares each of some steps with the nearest one of another episode. `None` for too few steps.
+pub fn agreement(episodes: &[(Vec<&[f32]>, Vec<ActionValue>)]) -> Option<Agreement> {
+    let all: Vec<Step<'_>> = episodes
+        .iter()
+        .enumerate()
+        .flat_map(|(number, (rows, actions))| rows.iter().zip(actions).map(move |(row, action)| (number, *row, action)))
+        .collect();
+    let steps: Vec<Step<'_>> = all.iter().step_by(all.len().div_ceil(STEPS).max(1)).copied().collect();
+    let columns = statistics(steps.iter().map(|(_, row, _)| *row));
+    let scales: Vec<f64> = columns.iter().map(|column| column.deviation.max(1e-9)).collect();
+    let distance = |one: &[f32], other: &[f32], most: f64| {
+        let mut sum = 0.0;
+        for ((one, other), scale) in one.iter().zip(other).zip(&scales) {
+            sum += (f64::from(*one - *other) / scale).powi(2);
+            if sum > most {
+                return f64::INFINITY;
+            }
+        }
+        sum
+    };
+    let (mut agreed, mut pairs, mut equal, mut differing) = (0.0, 0_usize, 0_usize, 0_usize);
+    for (number, row, action) in steps.iter().step_by(steps.len().div_ceil(ASKED).max(1)) {
+        let mut nearest: Option<(f64, &ActionValue)> = None;
+        for (other, other_row, other_action) in &steps {
+            if other == number || other_row.len() != row.len() {
+                continue;
+            }
+            let far = distance(row, other_row, nearest.map_or(f64::INFINITY, |(far, _)| far));
+            if nearest.is_none_or(|(most, _)| far < most) {
+                nearest = Some((far, other_action));
+            }
+        }
+        let Some((far, other_action)) = nearest else { continue };
+        pairs += 1;
+        agreed += likeness(action, other_action);
+        if far.sqrt() <= EQUAL {
+            equal += 1;
+            differing += usize::from(action != &other_action);
+        }
+    }
+    let chance = chance(&steps.iter().map(|(_, _, action)| *action).collect::<Vec<_>>());
+    let agreed = agreed / pairs.max(1) as f64;
+    let beyond_chance = match steps.first() {
+        Some((_, _, ActionValue::Continuous(_))) => 1.0 - agreed / chance.max(1e-12),
+        _ => (agreed - chance) / (1.0 - chance).max(1e-12),
+    };
+    let differing = differing as f64 / equal.max(1) as f64;
+    (pairs >= FEWEST).then_some(Agreement { pairs, beyond_chance, chance, equal, differing })
+}
+
+/// Returns 1 for equal discrete actions and 0 for others, or the squared distance of continuous ones.
+fn likeness(one: &ActionValue, other: &ActionValue) -> f64 {
+    match (one, other) {
+        (ActionValue::Continuous(one), ActionValue::Continuous(other)) => {
+            one.iter().zip(other).map(|(one, other)| f64::from(one - other).powi(2)).sum()
+        }
+        (one, other) => f64::from(u8::from(one == other)),
+    }
+}
+
+/// Returns the mean likeness of two steps drawn at random.
+fn chance(actions: &[&ActionValue]) -> f64 {
+    let count = actions.len().max(1) as f64;
+    match actions.first() {
+        Some(ActionValue::Continuous(first)) => (0..first.len())
+            .map(|at| {
+                let values = || {
+                    actions.iter().filter_map(move |action| match action {
+                        ActionValue::Continuous(values) => values.get(at).map(|value| f64::from(*value)),
+                        ActionValue::Discrete(_) => None,
+                    })
+                };
+                let average = mean(values()).unwrap_or_default();
+                2.0 * mean(values().map(|value| (value - average).powi(2))).unwrap_or_default()
+            })
+            .sum(),
+        _ => {
+            let mut counts = BTreeMap::<u32, f64>::new();
+            for action in actions {
+                if let ActionValue::Discrete(number) = action {
+                    *counts.entry(*number).or_default() += 1.0;
+                }
+            }
+            counts.values().map(|number| (number / count).powi(2)).sum()
+        }
+    }
+}
+
+/// Checks whether the recorded actions depend on what was observed.
+pub fn check(evidence: &Evidence) -> Vec<LearningFinding> {
+    let Some(set) = &evidence.recordings else { return Vec::new() };
+    let seen = set.seen();
+    let Some(found) = agreement(&seen) else { return Vec::new() };
+    let noise = set.episodes.iter().map(|episode| episode.noise).fold(0.0, f64::max);
+    let is_discrete = seen.iter().any(|(_, actions)| matches!(actions.first(), Some(ActionValue::Discrete(_))));
+    let is_one = is_discrete && found.chance > 0.95 || !is_discrete && found.chance < 1e-6;
+    if !is_one && found.beyond_chance < NO_AGREEMENT {
+        let cause = match is_discrete && noise > 0.5 {
+            true => format!("{} of the recorded actions are random", percent(noise)),
+            false => "the demonstrator acts at random, or by something that agents do not observe".to_owned(),
+        };
+        return vec![LearningFinding::new(
+            Sign::Contradictory,
+            format!(
+                "in {} of steps with nearly the same observation, actions agree {} of the way from chance to always",
+                counted(found.pairs as u64, "pair"),
+                percent(found.beyond_chance.max(0.0))
+            ),
+            cause,
+            &[Advice::RecordAgain, Advice::ObserveMore],
+        )];
+    }
+    if is_discrete && found.equal >= FEWEST / 3 && found.differing > MOST_DISAGREEMENT.max(3.0 * noise) {
+        return vec![LearningFinding::new(
+            Sign::PartialObservation,
+            format!(
+                "{} of {} pairs of equal observations have different actions (noise {})",
+                percent(found.differing),
+                whole(found.equal as f64),
+                readable(noise)
+            ),
+            "the demonstrator sees something that the observation does not hold",
+            &[Advice::ObserveMore, Advice::RecordAgain],
+        )];
+    }
+    Vec::new()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ten episodes of 40 steps whose action is a function of the observation and of the step.
+    fn episodes(action: impl Fn(usize, usize) -> u32) -> Vec<(Vec<f32>, Vec<ActionValue>)> {
+        (0..10)
+            .map(|episode| {
+                let rows = (0..40).map(|step| ((step * 7 + episode * 3) % 20) as f32).collect::<Vec<_>>();
+                let actions = (0..40)
+                    .map(|step| ActionValue::Discrete(action((step * 7 + episode * 3) % 20, step * 31 + episode * 17)));
+                (rows, actions.collect())
+            })
+            .collect()
+    }
+
+    fn measured(action: impl Fn(usize, usize) -> u32) -> Agreement {
+        let made = episodes(action);
+        let seen: Vec<_> = made.iter().map(|(rows, actions)| (rows.chunks(1).collect(), actions.clone())).collect();
+        agreement(&seen).expect("enough steps")
+    }
+
+    #[test]
+    fn actions_that_follow_from_observations_agree() {
+        let found = measured(|seen, _| u32::from(seen > 9));
+        assert!(found.beyond_chance > 0.99 && found.differing == 0.0, "{found:?}");
+        assert_eq!(found.equal, found.pairs, "every observation comes back");
+    }
+
+    #[test]
+    fn actions_that_follow_from_something_else_agree_by_chance() {
+        let found = measured(|_, hidden| (hidden as u32).wrapping_mul(2_654_435_761) >> 31);
+        assert!(found.beyond_chance.abs() < 0.2 && found.differing > 0.3, "{found:?}");
+        assert!((found.chance - 0.5).abs() < 0.05, "{found:?}");
+    }
+
+    #[test]
+    fn too_few_steps_say_nothing() {
+        let made = episodes(|_, _| 0);
+        let few: Vec<_> = made[..2].iter().map(|(rows, actions)| (rows.chunks(1).collect(), actions.clone())).collect();
+        assert_eq!(agreement(&few), None);
+    }
+}
