@@ -8,7 +8,7 @@
 //! - `finding`: signs, findings and the diagnosis; `advice`: what to try, as commands and settings that exist.
 //! - `evidence`: all that checks read. `play`, `recordings`, `forced` and `networks` measure it, and `gather` puts it
 //!   together.
-//! - `metrics`: checks of settings and metrics. `observation`, `agreement`, `actions`, `reward`, `demonstrations` and
+//! - `metrics`: checks of settings and metrics. `observation`, `agreement` (with `probe`), `actions`, `reward`, `demonstrations` and
 //!   `score`: checks of what was played, recorded and learned.
 
 mod actions;
@@ -23,6 +23,7 @@ mod metrics;
 pub mod networks;
 mod observation;
 pub mod play;
+mod probe;
 pub mod recordings;
 mod reward;
 mod score;

@@ -116,7 +116,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     }
     interrupt::go_on_with(format!("`{program} train --run {path} --resume`"));
     let mut warning = FirstWarning::new(training.trainer.experiment());
-    let mut console = console.on_update(move |report| {
+    let mut console = console.on_update(|report| {
         if let Some(words) = warning.note(report) {
             let words = program::named(&words);
             report!("warning: {words} (`{program} diagnose --run {path} --replays` looks further)");

@@ -1,11 +1,13 @@
-//! Checks of whether observations decide actions, by nearest neighbours in recordings.
+//! Checks of whether observations decide actions, by nearest neighbours in recordings and a probe network.
 
 use crate::diagnose::{
     advice::Advice,
     evidence::Evidence,
     finding::{LearningFinding, Sign},
     observation::statistics,
-    play::mean,
+    play::{PlayedEpisode, mean},
+    probe::{ProbeSteps, accuracy},
+    recordings::replayed_episodes,
 };
 use bevy_playbot::action::ActionValue;
 use playbot_report::{counted, percent, readable, whole};
@@ -41,6 +43,9 @@ pub struct Agreement {
     /// Share of these whose actions differ.
     pub differing: f64,
 }
+
+/// Share of actions that the full state predicts beyond the observation, from which on it decides.
+const MORE_BY_STATE: f64 = 0.25;
 
 /// One recorded step with the number of its episode.
 type Step<'a> = (usize, &'a [f32], &'a ActionValue);
@@ -133,6 +138,41 @@ fn chance(actions: &[&ActionValue]) -> f64 {
     }
 }
 
+/// Returns the share of recorded discrete actions that a probe network predicts from observations, and from observations
+/// with the full state. `None` without replays, without a state, or for too few steps.
+fn probed(evidence: &Evidence) -> Option<(f64, f64)> {
+    let set = evidence.recordings.as_ref()?;
+    let episodes: Vec<&PlayedEpisode> = replayed_episodes(set).collect();
+    let actions = episodes.iter().flat_map(|episode| &episode.actions).filter_map(|action| match action {
+        ActionValue::Discrete(number) => Some(*number as usize + 1),
+        ActionValue::Continuous(_) => None,
+    });
+    let actions = actions.max()?;
+    let steps = |is_asked: bool, with_state: bool| -> ProbeSteps {
+        let chosen = episodes.iter().enumerate().filter(|(number, _)| (number % 4 == 3) == is_asked);
+        let of_episode = |(_, episode): (usize, &&PlayedEpisode)| -> ProbeSteps {
+            // The state before an action is the one after the tick before it.
+            let rows = episode.rows().zip(&episode.actions).skip(1).zip(&episode.states);
+            rows.filter_map(|((row, action), state)| match action {
+                ActionValue::Discrete(number) => {
+                    let more = if with_state { state.as_slice() } else { &[] };
+                    Some(([row, more].concat(), *number as usize))
+                }
+                ActionValue::Continuous(_) => None,
+            })
+            .collect()
+        };
+        chosen.flat_map(of_episode).collect()
+    };
+    let has_state = episodes.iter().all(|episode| episode.states.first().is_some_and(|state| !state.is_empty()));
+    if !has_state {
+        return None;
+    }
+    let seen = accuracy(&steps(false, false), &steps(true, false), actions)?;
+    let known = accuracy(&steps(false, true), &steps(true, true), actions)?;
+    Some((seen, known))
+}
+
 /// Checks whether the recorded actions depend on what was observed.
 pub fn check(evidence: &Evidence) -> Vec<LearningFinding> {
     let Some(set) = &evidence.recordings else { return Vec::new() };
@@ -170,7 +210,19 @@ pub fn check(evidence: &Evidence) -> Vec<LearningFinding> {
             &[Advice::ObserveMore, Advice::RecordAgain],
         )];
     }
-    Vec::new()
+    match probed(evidence) {
+        Some((seen, known)) if known - seen > MORE_BY_STATE => vec![LearningFinding::new(
+            Sign::PartialObservation,
+            format!(
+                "a probe network predicts {} of the recorded actions from the observation, and {} with the full state",
+                percent(seen),
+                percent(known)
+            ),
+            "what decides is in the state of the game, and not in the observation",
+            &[Advice::ObserveMore],
+        )],
+        _ => Vec::new(),
+    }
 }
 
 #[cfg(test)]

@@ -81,6 +81,9 @@ pub struct PlayedEpisode {
     pub end: Option<EpisodeEnd>,
     /// True if the goal was reached.
     pub success: bool,
+    /// The full state after each tick, as far as the game says it: the agent's position, and the numbers of a trace.
+    /// Replays alone have it.
+    pub states: Vec<Vec<f32>>,
 }
 
 impl PlayedEpisode {
@@ -297,8 +300,10 @@ pub fn replay(
     for recorded in episodes.iter().filter(|episode| !episode.is_empty()) {
         world.insert_resource(Watching::default());
         Replay::new(recorded.clone()).paid_anew().start(&mut world.entity_mut(agent));
+        let mut states = Vec::new();
         let divergence = loop {
             tick_world(&mut world).map_err(|fault| fault.to_string())?;
+            states.push(full_state(game, &world, agent));
             let Some(replay) = world.get::<Replay>(agent) else { continue };
             if let Some(divergence) = replay.divergence() {
                 break Some(divergence.to_string());
@@ -309,7 +314,15 @@ pub fn replay(
         };
         let watched = std::mem::take(&mut world.resource_mut::<Watching>().watched);
         let episode = watched.done.into_iter().next().or_else(|| watched.running.into_values().next());
-        replayed.push(Replayed { episode: episode.unwrap_or_default(), divergence });
+        replayed.push(Replayed { episode: PlayedEpisode { states, ..episode.unwrap_or_default() }, divergence });
     }
     Ok(replayed)
+}
+
+/// Returns the state of an agent as far as the game says it.
+fn full_state(game: &dyn Game, world: &World, agent: Entity) -> Vec<f32> {
+    let tools = game.tools();
+    let position = tools.state.position(world, agent).into_iter().flat_map(|at| [at.x, at.y]);
+    let traced = if tools.trace.columns().is_some() { tools.trace.row(world, agent) } else { Vec::new() };
+    position.chain(traced).filter(|value| value.is_finite()).collect()
 }
