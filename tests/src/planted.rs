@@ -182,7 +182,9 @@ impl Game for PlantedGame {
         match self.fault {
             RuleFault::None | RuleFault::OtherVersion => {}
             RuleFault::ConstantObservation | RuleFault::HalfObservation | RuleFault::LargeValue => {
-                app.add_systems(ObserveSchedule, change_observation);
+                // After all sensors, whatever their order.
+                let after = change_observation.after(PlaybotSystems::Observe).before(PlaybotSystems::Decide);
+                app.add_systems(decide, after.run_if(is_tick));
             }
             RuleFault::Forbidden => {
                 app.add_systems(ObserveSchedule, forbid);

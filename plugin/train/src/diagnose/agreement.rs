@@ -17,6 +17,14 @@ use std::collections::BTreeMap;
 const STEPS: usize = 2000;
 const ASKED: usize = 400;
 
+/// Width of an observation from which on fewer steps are compared, and their numbers.
+const WIDE: usize = 100;
+const WIDE_STEPS: usize = 700;
+const WIDE_ASKED: usize = 160;
+
+/// Most inputs of the probe network.
+const MOST_INPUTS: usize = 300;
+
 /// Fewest pairs about which anything is said.
 const FEWEST: usize = 150;
 
@@ -57,7 +65,9 @@ pub fn agreement(episodes: &[(Vec<&[f32]>, Vec<ActionValue>)]) -> Option<Agreeme
         .enumerate()
         .flat_map(|(number, (rows, actions))| rows.iter().zip(actions).map(move |(row, action)| (number, *row, action)))
         .collect();
-    let steps: Vec<Step<'_>> = all.iter().step_by(all.len().div_ceil(STEPS).max(1)).copied().collect();
+    let is_wide = all.first().is_some_and(|(_, row, _)| row.len() > WIDE);
+    let (most, asked) = if is_wide { (WIDE_STEPS, WIDE_ASKED) } else { (STEPS, ASKED) };
+    let steps: Vec<Step<'_>> = all.iter().step_by(all.len().div_ceil(most).max(1)).copied().collect();
     let columns = statistics(steps.iter().map(|(_, row, _)| *row));
     let scales: Vec<f64> = columns.iter().map(|column| column.deviation.max(1e-9)).collect();
     let distance = |one: &[f32], other: &[f32], most: f64| {
@@ -71,7 +81,7 @@ pub fn agreement(episodes: &[(Vec<&[f32]>, Vec<ActionValue>)]) -> Option<Agreeme
         sum
     };
     let (mut agreed, mut pairs, mut equal, mut differing) = (0.0, 0_usize, 0_usize, 0_usize);
-    for (number, row, action) in steps.iter().step_by(steps.len().div_ceil(ASKED).max(1)) {
+    for (number, row, action) in steps.iter().step_by((steps.len() / asked).max(1)) {
         let mut nearest: Option<(f64, &ActionValue)> = None;
         for (other, other_row, other_action) in &steps {
             if other == number || other_row.len() != row.len() {
@@ -165,7 +175,8 @@ fn probed(evidence: &Evidence) -> Option<(f64, f64)> {
         chosen.flat_map(of_episode).collect()
     };
     let has_state = episodes.iter().all(|episode| episode.states.first().is_some_and(|state| !state.is_empty()));
-    if !has_state {
+    let is_narrow = |episode: &PlayedEpisode| episode.width + episode.states.first().map_or(0, Vec::len) <= MOST_INPUTS;
+    if !has_state || !episodes.iter().all(|episode| is_narrow(episode)) {
         return None;
     }
     let seen = accuracy(&steps(false, false), &steps(true, false), actions)?;

@@ -76,6 +76,8 @@ pub struct DecoderProbe {
     pub nll: f64,
     /// That of the frequencies of the actions, or of one normal distribution for all states.
     pub frequencies: f64,
+    /// How much worse the decoder may be: a deviation σ that has not fallen yet costs half a nat in each dimension.
+    pub margin: f64,
 }
 
 /// Gives a skill model recorded steps. `None` for pictures, or without steps.
@@ -102,7 +104,11 @@ pub fn probe_decoder(model: &SkillModel, steps: &[(&[f32], ActionValue)]) -> Res
     }
     let nll = mean(total.iter().map(|likelihood| -libm::log(likelihood.max(1e-30)))).unwrap_or_default();
     let actions: Vec<_> = steps.iter().map(|(_, action)| action).collect();
-    Ok(Some(DecoderProbe { rows: count, nll, frequencies: marginal_entropy(&actions) }))
+    let margin = match model.action_space() {
+        ActionSpace::Discrete(_) => 0.05,
+        ActionSpace::Continuous(dim) => 0.5 * dim as f64,
+    };
+    Ok(Some(DecoderProbe { rows: count, nll, frequencies: marginal_entropy(&actions), margin }))
 }
 
 /// Returns the entropy of the frequencies of actions, or of a normal distribution with their mean and deviation.

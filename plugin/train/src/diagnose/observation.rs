@@ -18,6 +18,9 @@ const CLIPPED_AT: f64 = 10.0;
 /// Share of values beyond that bound which is too large.
 const MOST_CLIPPED: f64 = 0.02;
 
+/// Share of the recorded rows in which a value must be another one than the constant that is played.
+const OFTEN: f64 = 0.2;
+
 /// Fewest rows about which a statistic says something.
 const FEWEST_ROWS: usize = 50;
 
@@ -95,6 +98,20 @@ pub fn check(evidence: &Evidence) -> Vec<LearningFinding> {
     found
 }
 
+/// Returns the share of the recorded rows in which a value is another one than this.
+fn recorded_share(evidence: &Evidence, number: usize, value: f32) -> f64 {
+    let Some(set) = &evidence.recordings else { return 0.0 };
+    let is_same = set.names.is_empty() || set.names == evidence.names;
+    let kept =
+        set.episodes.iter().filter(|episode| episode.width == evidence.names.len() && is_same && episode.width > 0);
+    let (mut rows, mut others) = (0_u64, 0_u64);
+    for row in kept.flat_map(|episode| episode.episode.observations.chunks(episode.width)) {
+        rows += 1;
+        others += u64::from(row[number] != value);
+    }
+    others as f64 / rows.max(1) as f64
+}
+
 /// Returns the statistics of the recorded values, if they are those of the game's sensor.
 fn recorded(evidence: &Evidence, width: usize) -> Vec<ColumnStatistics> {
     let Some(set) = &evidence.recordings else { return Vec::new() };
@@ -130,7 +147,7 @@ fn constant(
     let varied: Vec<usize> = constants
         .iter()
         .copied()
-        .filter(|&number| recorded.get(number).is_some_and(|column| column.rows > 0 && !column.is_constant()))
+        .filter(|&number| recorded_share(evidence, number, columns[number].min) >= OFTEN)
         .collect();
     let shown = if varied.is_empty() { &constants } else { &varied };
     let names: Vec<String> = shown.iter().map(|&number| evidence.value_name(number)).collect();
@@ -194,8 +211,10 @@ fn not_as_recorded(evidence: &Evidence, recorded: &[ColumnStatistics]) -> Vec<Le
     for row in episodes.iter().flat_map(PlayedEpisode::rows).filter(|row| row.len() == recorded.len()) {
         values += 1;
         for ((count, column), value) in beyond.iter_mut().zip(recorded).zip(row) {
-            let is_far = (f64::from(*value) - column.mean).abs() > CLIPPED_AT * column.deviation.max(1e-6);
-            *count += usize::from(is_far && column.deviation > 0.0);
+            // A value that is rarely recorded lies many deviations from the mean, too.
+            let is_known = (column.min..=column.max).contains(value);
+            let is_far = (f64::from(*value) - column.mean).abs() > CLIPPED_AT * column.deviation;
+            *count += usize::from(is_far && !is_known && column.deviation > 0.0);
         }
     }
     let often = |count: &usize| *count as f64 > MOST_CLIPPED * values as f64;

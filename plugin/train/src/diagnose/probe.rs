@@ -8,11 +8,11 @@ use playbot_learner::{
 
 /// Hidden units, passes over the steps, and the step size of plain stochastic gradient descent.
 const HIDDEN: usize = 24;
-const PASSES: usize = 30;
+const PASSES: usize = 25;
 const RATE: f32 = 0.05;
 
 /// Most steps that are learned from.
-const STEPS: usize = 1500;
+const STEPS: usize = 1000;
 
 /// Steps to learn from: inputs of equal length, and the number of the action.
 pub type ProbeSteps = Vec<(Vec<f32>, usize)>;

@@ -25,6 +25,10 @@ const FEWEST_EPISODES: f64 = 100.0;
 /// Present value of a reward under which it does not reach the start of an episode.
 const SMALLEST_VALUE: f64 = 1e-3;
 
+/// A horizon of fewer ticks is short where episodes are so many times as long.
+const SHORTEST_HORIZON: f64 = 10.0;
+const LONG_IN_HORIZONS: f64 = 5.0;
+
 /// Checks rewards, horizon and time limit.
 pub fn check(evidence: &Evidence) -> Vec<LearningFinding> {
     let mut found = Vec::new();
@@ -195,20 +199,29 @@ fn horizon(evidence: &Evidence) -> Option<LearningFinding> {
         let recorded = evidence.recordings.iter().flat_map(|set| &set.episodes);
         times = recorded.filter_map(|episode| episode.first_reward()).collect();
     }
-    let time = median(times)?;
-    let value = libm::pow(gamma, time as f64);
-    (value < SMALLEST_VALUE).then(|| {
-        LearningFinding::new(
-            Sign::ShortHorizon,
-            format!(
-                "the demonstrator is rewarded after {} ticks, when γ = {gamma} leaves {} of the reward",
-                whole(time as f64),
-                readable(value)
-            ),
-            "the reward does not reach the actions that lead there",
-            &[Advice::LookAhead],
-        )
-    })
+    let ahead = 1.0 / (1.0 - gamma).max(1e-9);
+    let lengths = evidence.played.iter().flat_map(|played| &played.episodes).map(PlayedEpisode::ticks);
+    let (time, length) = (median(times), median(lengths.collect()));
+    let value = time.map(|time| libm::pow(gamma, time as f64));
+    let words = match (time.zip(value), length) {
+        (Some((time, value)), _) if value < SMALLEST_VALUE => format!(
+            "the demonstrator is rewarded after {} ticks, when γ = {gamma} leaves {} of the reward",
+            whole(time as f64),
+            readable(value)
+        ),
+        (_, Some(length)) if ahead < SHORTEST_HORIZON && length as f64 > LONG_IN_HORIZONS * ahead => format!(
+            "γ = {gamma} looks {} ticks ahead, and half of the played episodes have {} or more",
+            readable(ahead),
+            whole(length as f64)
+        ),
+        _ => return None,
+    };
+    Some(LearningFinding::new(
+        Sign::ShortHorizon,
+        words,
+        "the reward does not reach the actions that lead there",
+        &[Advice::LookAhead],
+    ))
 }
 
 #[cfg(test)]
@@ -273,5 +286,7 @@ mod tests {
         let players = [player(Seat::Random, 0.0, CUT), player(Seat::Demonstrator, 1.0, WON)];
         assert_eq!(signs(&players, "ppo: (gamma: 0.8)"), [Sign::ShortHorizon], "0.8^40 is 1.3e-4");
         assert_eq!(signs(&players, "ppo: (gamma: 0.9)"), [], "0.9^40 is 0.015");
+        let unpaid = [player(Seat::Random, 0.5, CUT)];
+        assert_eq!(signs(&unpaid, "ppo: (gamma: 0.8)"), [Sign::ShortHorizon], "40 ticks are eight horizons");
     }
 }

@@ -63,7 +63,7 @@ fn networks(evidence: &Evidence) -> Vec<LearningFinding> {
 }
 
 fn decoder(evidence: &Evidence) -> Option<LearningFinding> {
-    let probe = evidence.decoder.filter(|probe| probe.nll >= probe.frequencies)?;
+    let probe = evidence.decoder.filter(|probe| probe.nll > probe.frequencies + probe.margin)?;
     Some(LearningFinding::new(
         Sign::WeakDecoder,
         format!(
@@ -126,9 +126,9 @@ mod tests {
     #[test]
     fn a_decoder_is_compared_with_frequencies() {
         let mut evidence = evidence("score-ppo", "");
-        evidence.decoder = Some(DecoderProbe { rows: 9, nll: 0.5, frequencies: 1.0 });
+        evidence.decoder = Some(DecoderProbe { rows: 9, nll: 1.0, frequencies: 1.0, margin: 0.1 });
         assert_eq!(signs(&evidence), []);
-        evidence.decoder = Some(DecoderProbe { rows: 9, nll: 1.5, frequencies: 1.0 });
+        evidence.decoder = Some(DecoderProbe { rows: 9, nll: 1.5, frequencies: 1.0, margin: 0.1 });
         assert_eq!(signs(&evidence), [Sign::WeakDecoder]);
     }
 
