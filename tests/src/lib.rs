@@ -10,6 +10,7 @@ pub mod hostile;
 pub mod measuring;
 pub mod memory;
 mod painted;
+pub mod planted;
 pub mod power_cut;
 pub mod recording;
 pub mod scene;

@@ -2,6 +2,7 @@
 
 mod calibrate;
 mod detectors;
+mod diagnose;
 mod eval;
 mod explore;
 mod findings;

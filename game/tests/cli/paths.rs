@@ -61,7 +61,9 @@ fn paths_in_an_experiment_start_in_its_folder_or_else_in_this_one() {
     write("own/train/1.json", &level("1"));
     write("test/1.json", &level("2"));
     write("own/base/test/1.json", &level("3"));
-    ["own/easy/1.json", "own/base/easy/1.json"].map(|path| write(path, &level("4")));
+    for path in ["own/easy/1.json", "own/base/easy/1.json"] {
+        write(path, &level("4"));
+    }
     write("own/walks.demo", "");
     write("walks.demo", "");
     write("others.demo", "");

@@ -21,6 +21,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
             "learn-skills",
             "imitate",
             "train",
+            "diagnose",
             "study",
             "eval",
             "config",

@@ -5,8 +5,8 @@
 //!   [`report`], [`history`], [`bisect`], [`bugs`].
 //! - See levels and episodes: [`level`], [`trace`], [`view`], [`eyes`], [`skills`], [`play`].
 //! - Record: [`record`], [`demo`].
-//! - Learn: [`quickstart`], [`teach`], [`learn_skills`], [`imitate`], [`train`], [`study`], [`eval`], [`config`], [`runs`],
-//!   [`policy`], [`bench`].
+//! - Learn: [`quickstart`], [`teach`], [`learn_skills`], [`imitate`], [`train`], [`diagnose`], [`study`], [`eval`],
+//!   [`config`], [`runs`], [`policy`], [`bench`].
 //! - Use the shell: [`completions`].
 //!
 //! A verb reads its options, opens what they name, calls the library, and prints what comes back. Options that several
@@ -20,6 +20,7 @@ pub(crate) mod bugs;
 pub(crate) mod completions;
 pub(crate) mod config;
 pub(crate) mod demo;
+pub(crate) mod diagnose;
 pub(crate) mod doctor;
 pub(crate) mod eval;
 pub(crate) mod explore;

@@ -411,6 +411,7 @@ impl<'a> Imitation<'a> {
             success_rate: measured.as_ref().map(|summary| summary.success),
             clipped_share: None,
             initial_kl: None,
+            levels: Vec::new(),
             learner: metrics,
             timing: Timing { collect_s: labelled.as_secs_f64(), learn_s: learned.as_secs_f64(), ..Timing::default() },
         })
@@ -423,6 +424,7 @@ impl<'a> Imitation<'a> {
         let Asked { steps, episodes } = ask(&AskPlan {
             game: self.game,
             levels: &self.levels.labelled,
+            randomise: &self.experiment.randomise,
             observation_config: self.experiment.observation_config(),
             seed: seed_of(*seed, round),
             share: imitation.beta.powi(i32::try_from(round).unwrap_or(i32::MAX)),

@@ -16,6 +16,7 @@
 //! - [`imitate`]: imitation of recordings, or of a demonstrator that is asked (DAgger).
 //! - [`policy_export`]: the one file that a game ships with.
 //! - [`lesson`]: from a recording to a policy that plays at once, and gets better.
+//! - [`diagnose`]: why a training does not learn, as findings.
 //! - [`runs`]: runs on disk, found and compared over seeds.
 //! - [`study`] and [`study_runner`]: variants of an experiment, each with every seed, and their tables.
 
@@ -24,6 +25,7 @@ pub mod begin_from;
 pub mod checkpoint;
 pub mod collect;
 pub mod demo;
+pub mod diagnose;
 mod error;
 pub mod experiment;
 pub mod imitate;

@@ -32,6 +32,7 @@ use playbot_report::{
 };
 use playbot_train::{
     Algorithm, Experiment,
+    diagnose::{Diagnosis, of_metrics},
     learn_skills::{behaviour_cloning, learn},
     metrics_log::SUCCESS_RATE,
     recordings::read_dataset,
@@ -214,6 +215,8 @@ struct Trained {
     steps_to_threshold: Option<u64>,
     steps_per_s: f64,
     finished: bool,
+    /// What settings and metrics show.
+    diagnosis: Diagnosis,
 }
 
 struct CurvePoint {
@@ -290,7 +293,8 @@ fn train_one(
     let player = Player::Policy { policy: trainer.policy(), prior: trainer.skill_prior(), draw };
     let settled = RunCurves::read(run.path())?;
     let steps_to_threshold = steps_to_reach(settled.settled(SUCCESS_RATE), experiment.study.threshold);
-    Ok(Trained { algorithm, player, curve, steps_to_threshold, steps_per_s, finished })
+    let diagnosis = of_metrics(&experiment, run.path())?;
+    Ok(Trained { algorithm, player, curve, steps_to_threshold, steps_per_s, finished, diagnosis })
 }
 
 fn stopped(args: &Args, algorithm: Algorithm) -> Outcome {

@@ -29,6 +29,7 @@ use playbot_train::{
     Algorithm, Experiment, LearnerKind, TrainError,
     begin_from::{BeginFrom, Started},
     checkpoint::CheckpointChoice,
+    diagnose::FirstWarning,
     run_dir::{OpenedRun, RunDir},
     train_run::{NewRun, Training, TrainingError, TrainingSetup, goes_on_from, never_learns, rounded},
 };
@@ -123,6 +124,13 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         report_length(training.trainer.experiment());
     }
     interrupt::go_on_with(format!("`{program} train --run {path} --resume`"));
+    let mut warning = FirstWarning::new(training.trainer.experiment());
+    let mut console = console.on_update(|report| {
+        if let Some(words) = warning.note(report) {
+            let words = program::named(&words);
+            report!("warning: {words} (`{program} diagnose --run {path} --replays` looks further)");
+        }
+    });
     if training.drive(&mut console)? {
         report!("done: test it with `{program} eval --run {path}`");
         return Ok(Outcome::Pass);

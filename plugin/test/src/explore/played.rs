@@ -9,6 +9,7 @@ use bevy_playbot::vision::ObservationConfig;
 use playbot_harness::{
     eval::{EvalPlan, Player, evaluate_with_trails},
     game::Game,
+    randomise::Randomise,
     split::LevelSplit,
 };
 use serde::Serialize;
@@ -93,6 +94,7 @@ impl PlayedCells {
                 arenas: 1,
                 worlds: 1,
                 threads: 1,
+                randomise: Randomise::default(),
             };
             for trail in evaluate_with_trails(game, player, &plan, |_| {})? {
                 let left = steps.saturating_sub(played.ticks);

@@ -20,6 +20,7 @@ use bevy_playbot::{
 use playbot_harness::{
     game::Game,
     parallel::{on_threads, one_by_one},
+    randomise::Randomise,
     split::LevelSplit,
     worlds::{Arrangement, build_observing_world, is_bound_to_its_thread},
 };
@@ -35,6 +36,8 @@ pub(super) struct AskPlan<'a> {
     pub(super) game: &'a dyn Game,
     /// Levels, of which agents draw uniformly.
     pub(super) levels: &'a LevelSplit,
+    /// Values that each level draws.
+    pub(super) randomise: &'a Randomise,
     pub(super) observation_config: ObservationConfig,
     /// Random seed of the round.
     pub(super) seed: u64,
@@ -57,6 +60,7 @@ pub(super) struct Asked {
 /// Plays and asks. The result is the same on any number of threads: steps are in the order of the agents.
 pub(super) fn ask(plan: &AskPlan<'_>) -> Result<Asked, ImitateError> {
     let of_experiment = Arrangement::of_agents(plan.game, plan.arenas, plan.worlds);
+    let of_experiment = if plan.randomise.is_empty() { of_experiment } else { of_experiment.apart(plan.game) };
     let arrangement = match plan.observation_config.kind {
         ObservationKind::Camera => of_experiment,
         _ => of_experiment.for_threads(plan.game, plan.threads),
@@ -91,6 +95,7 @@ impl AskedWorld {
         let AskPlan { game, levels, seed, .. } = *plan;
         let (mut world, agents) =
             build_observing_world(game, &levels.mode, &plan.observation_config, seed, first, count)?;
+        plan.randomise.install(&mut world);
         Renewal::set_up(&mut world, |world| {
             world.init_resource::<Asking>();
             world.add_observer(note_end);

@@ -52,6 +52,14 @@ impl RunCurves {
         Ok(read)
     }
 
+    /// Appends the metrics of an update after the last one.
+    pub fn push<'a>(&mut self, step: u64, scalars: impl Iterator<Item = (&'a str, f64)>) {
+        self.last_step = self.last_step.max(step);
+        for (tag, value) in scalars {
+            self.curves.entry(tag.to_owned()).or_default().push((step, value));
+        }
+    }
+
     /// Returns the number of logged environment steps.
     pub fn last_step(&self) -> u64 {
         self.last_step

@@ -49,33 +49,42 @@ pub(super) fn write_report(
     };
     let config = ron::ser::to_string_pretty(experiment, ron::ser::PrettyConfig::default())
         .map_err(|error| CliError::Io(format!("cannot write the experiment as RON: {error}")))?;
+    let faulty = trained.iter().filter(|one| !one.diagnosis.is_healthy());
+    let why = faulty.map(|one| {
+        let section = one.diagnosis.section();
+        Section { heading: format!("{}: {}", one.algorithm, section.heading), ..section }
+    });
     let report = Report {
         title: format!("{}: skills from recordings, tested on unseen levels", experiment.game),
         subtitle: format!(
             "{} steps on {}, seed {}, {seconds:.0} seconds on this machine",
             experiment.steps, experiment.train, experiment.seed
         ),
-        sections: vec![
-            Section {
-                heading: "Unseen levels".to_owned(),
-                text: format!("{comparison}.\n\n{orientation}A blind player is a baseline that any learner must beat."),
-                tables: vec![Table::Results(table)],
-                ..Section::default()
-            },
-            Section {
-                heading: "Learning curves".to_owned(),
-                text: "Means over the last 100 training episodes.".to_owned(),
-                charts: vec![
-                    chart("Return on training levels", "return", curve(|point| point.episodic_return)),
-                    Chart {
-                        y_range: range_of(SUCCESS_RATE),
-                        ..chart("Success on training levels", "success rate", curve(|point| point.success_rate))
-                    },
-                ],
-                ..Section::default()
-            },
-            Section { heading: "Experiment".to_owned(), code: vec![config], ..Section::default() },
-        ],
+        sections: why
+            .chain([
+                Section {
+                    heading: "Unseen levels".to_owned(),
+                    text: format!(
+                        "{comparison}.\n\n{orientation}A blind player is a baseline that any learner must beat."
+                    ),
+                    tables: vec![Table::Results(table)],
+                    ..Section::default()
+                },
+                Section {
+                    heading: "Learning curves".to_owned(),
+                    text: "Means over the last 100 training episodes.".to_owned(),
+                    charts: vec![
+                        chart("Return on training levels", "return", curve(|point| point.episodic_return)),
+                        Chart {
+                            y_range: range_of(SUCCESS_RATE),
+                            ..chart("Success on training levels", "success rate", curve(|point| point.success_rate))
+                        },
+                    ],
+                    ..Section::default()
+                },
+                Section { heading: "Experiment".to_owned(), code: vec![config], ..Section::default() },
+            ])
+            .collect(),
     };
     report.write(path).map_err(|error| CliError::Io(error.to_string()))
 }

@@ -4,7 +4,7 @@ use crate::{
     arguments::default_experiment_of,
     error::{CliError, Outcome},
     output,
-    output::{print_line, print_table},
+    output::{print_line, print_table, program},
     verbs::runs::{UNKNOWN, age_s, duration, to_json, write_plot},
 };
 use playbot_harness::games::Games;
@@ -13,6 +13,7 @@ use playbot_train::{
     Experiment,
     ancestor::Ancestor,
     checkpoint::{Checkpoint, CheckpointSummary},
+    diagnose::of_metrics,
     metrics_log::{EPISODIC_RETURN, SUCCESS_RATE, range_of},
     runs::{RunCurves, RunRecord, changed_settings, with_defaults},
 };
@@ -55,6 +56,7 @@ pub(crate) fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     if args.json {
         print_line(full_json(&run))?;
     } else {
+        print_findings(&run)?;
         print_head(&run, games)?;
         print_curves(&curves)?;
         print_table(&metrics(&run))?;
@@ -75,6 +77,15 @@ fn curves<'a>(run: &'a RunRecord, wanted: &'a [String]) -> Result<Vec<TaggedCurv
     }
     let default = [EPISODIC_RETURN, SUCCESS_RATE];
     Ok(default.into_iter().map(|tag| (tag, run.curves.curve(tag))).filter(|(_, curve)| !curve.is_empty()).collect())
+}
+
+/// Prints what settings and metrics show of why it does not learn, if they show anything.
+fn print_findings(run: &RunRecord) -> Result<(), CliError> {
+    let diagnosis = of_metrics(&run.experiment, &run.path)?;
+    diagnosis.findings.iter().try_for_each(|finding| {
+        let words = finding.warning(&diagnosis.context);
+        print_line(format!("why it may not learn: {}", program::named(&words)))
+    })
 }
 
 fn print_head(run: &RunRecord, games: &Games) -> Result<(), CliError> {

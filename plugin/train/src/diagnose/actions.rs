@@ -1,0 +1,155 @@
+//! Checks of actions: those that change nothing, and those that masks forbid.
+
+use crate::diagnose::{
+    advice::Advice,
+    evidence::{Evidence, list},
+    finding::{LearningFinding, Sign},
+    forced::ForcedAction,
+    play::{PlayedEpisode, Seat},
+    recordings::RecordedSet,
+};
+use bevy_playbot::action::ActionValue;
+use playbot_report::{percent, whole};
+
+/// Share of the recorded ticks from which on an action is needed.
+const NEEDED: f64 = 0.01;
+
+/// Share of ticks that counts as nearly always.
+const NEARLY_ALWAYS: f64 = 0.99;
+
+/// Fewest ticks about which a mask says something.
+const FEWEST_TICKS: usize = 200;
+
+/// Checks forced actions and masks.
+pub fn check(evidence: &Evidence) -> Vec<LearningFinding> {
+    let mut found = Vec::new();
+    found.extend(forbidden(evidence));
+    found.extend(dead(evidence));
+    found
+}
+
+/// Returns the share of recorded or demonstrated ticks with a discrete action.
+fn demonstrated(evidence: &Evidence, action: u32) -> Option<f64> {
+    let recorded = evidence.recordings.as_ref().filter(|set| !set.episodes.is_empty());
+    let recorded = recorded.map(|set: &RecordedSet| set.share_of(action));
+    let live = evidence.played(Seat::Demonstrator).map(|played| {
+        let actions = || played.episodes.iter().flat_map(|episode| &episode.actions);
+        let taken = actions().filter(|taken| **taken == ActionValue::Discrete(action)).count();
+        taken as f64 / actions().count().max(1) as f64
+    });
+    match (recorded, live) {
+        (Some(recorded), Some(live)) => Some(recorded.max(live)),
+        (one, other) => one.or(other),
+    }
+}
+
+fn forbidden(evidence: &Evidence) -> Option<LearningFinding> {
+    let masks = || {
+        evidence.played.iter().flat_map(|played| &played.episodes).flat_map(|episode: &PlayedEpisode| &episode.masks)
+    };
+    let ticks = masks().count();
+    let actions = masks().next().map_or(0, Vec::len);
+    if ticks < FEWEST_TICKS {
+        return None;
+    }
+    let share =
+        |action: usize| masks().filter(|mask| !mask.get(action).copied().unwrap_or(true)).count() as f64 / ticks as f64;
+    let closed: Vec<u32> = (0..actions as u32).filter(|&action| share(action as usize) >= NEARLY_ALWAYS).collect();
+    let named = |action: u32| format!("`{}`", evidence.action_name(action));
+    let needed: Vec<u32> = closed
+        .iter()
+        .copied()
+        .filter(|&action| demonstrated(evidence, action).is_some_and(|share| share >= NEEDED))
+        .collect();
+    let is_unknown = evidence.recordings.is_none();
+    let shown = if needed.is_empty() && is_unknown { &closed } else { &needed };
+    if shown.is_empty() {
+        return None;
+    }
+    let names: Vec<String> = shown.iter().copied().map(named).collect();
+    let taken = shown.iter().filter_map(|&action| demonstrated(evidence, action)).sum::<f64>();
+    let how = match needed.is_empty() {
+        true => "no recording shows whether they are needed".to_owned(),
+        false => format!("demonstrators take them in {} of the ticks", percent(taken)),
+    };
+    Some(LearningFinding::new(
+        Sign::ForbiddenActions,
+        format!("masks forbid {} in nearly all of {} ticks, and {how}", list(&names), whole(ticks as f64)),
+        "`LegalActions` has a wrong entry, or its entries are in another order than the actions",
+        &[Advice::AllowActions],
+    ))
+}
+
+fn dead(evidence: &Evidence) -> Option<LearningFinding> {
+    let dead: Vec<&ForcedAction> = evidence.forced.iter().filter(|action| action.is_dead()).collect();
+    let tried = evidence.forced.iter().filter(|action| action.tried > 0).count();
+    let is_continuous = matches!(
+        evidence.played.iter().flat_map(|played| &played.episodes).flat_map(|episode| &episode.actions).next(),
+        Some(ActionValue::Continuous(_))
+    );
+    let needed: Vec<&&ForcedAction> = dead
+        .iter()
+        .filter(|action| is_continuous || demonstrated(evidence, action.number).is_some_and(|share| share >= NEEDED))
+        .collect();
+    let all = !dead.is_empty() && dead.len() == tried;
+    if needed.is_empty() && !all {
+        return None;
+    }
+    let names: Vec<String> = match all {
+        true => dead.iter().map(|action| format!("`{}`", action.name)).collect(),
+        false => needed.iter().map(|action| format!("`{}`", action.name)).collect(),
+    };
+    let moments = dead.iter().map(|action| action.tried).max().unwrap_or_default();
+    Some(LearningFinding::new(
+        Sign::DeadActions,
+        format!(
+            "{} of {tried} actions do what doing nothing does, held at {moments} moments of an episode: {}",
+            names.len(),
+            list(&names)
+        ),
+        "the game ignores the key, reads the action in a schedule that does not run, or reads another agent's",
+        &[Advice::HeedActions, Advice::FindDeadActions],
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::testing::{evidence, played};
+
+    fn forced(effects: [usize; 3]) -> Vec<ForcedAction> {
+        let action = |(number, effects)| ForcedAction { name: format!("key {number}"), number, tried: 3, effects };
+        (0..).zip(effects).map(action).collect()
+    }
+
+    #[test]
+    fn a_dead_action_counts_if_it_is_demonstrated_or_if_all_are_dead() {
+        let mut evidence = evidence("ppo", "");
+        evidence.forced = forced([3, 0, 1]);
+        assert!(check(&evidence).is_empty(), "nothing needs the dead one");
+        evidence.played = vec![played(Seat::Demonstrator, 100, |tick| (vec![tick as f32], 1, 0.0))];
+        let found = check(&evidence);
+        assert_eq!(found[0].sign, Sign::DeadActions);
+        assert!(found[0].evidence.starts_with("1 of 3 actions do what doing nothing does"), "{:?}", found[0]);
+        assert!(found[0].evidence.ends_with("`key 1`"), "{:?}", found[0]);
+        evidence.played = vec![played(Seat::Random, 100, |tick| (vec![tick as f32], 1, 0.0))];
+        evidence.forced = forced([0, 0, 0]);
+        assert!(check(&evidence)[0].evidence.starts_with("3 of 3"), "nothing works");
+    }
+
+    #[test]
+    fn a_mask_that_forbids_what_is_demonstrated_is_found() {
+        let mut evidence = evidence("ppo", "");
+        let mut random = played(Seat::Random, 300, |tick| (vec![tick as f32], 0, 0.0));
+        random.episodes[0].masks = vec![vec![true, false]; 300];
+        let demonstrator = played(Seat::Demonstrator, 100, |tick| (vec![tick as f32], 1, 0.0));
+        evidence.played = vec![random, demonstrator];
+        let found = check(&evidence);
+        assert_eq!(found[0].sign, Sign::ForbiddenActions);
+        assert!(found[0].evidence.contains("`action 1` in nearly all of 300 ticks"), "{:?}", found[0]);
+        for mask in &mut evidence.played[0].episodes[0].masks[..50] {
+            mask[1] = true;
+        }
+        assert!(check(&evidence).is_empty(), "it is legal at times");
+    }
+}

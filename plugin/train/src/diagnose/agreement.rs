@@ -1,0 +1,281 @@
+//! Checks of whether observations decide actions, by nearest neighbours in recordings and a probe network.
+
+use crate::diagnose::{
+    advice::Advice,
+    evidence::Evidence,
+    finding::{LearningFinding, Sign},
+    observation::statistics,
+    play::{PlayedEpisode, mean},
+    probe::{ProbeSteps, accuracy},
+    recordings::replayed_episodes,
+};
+use bevy_playbot::action::ActionValue;
+use playbot_report::{counted, percent, readable, whole};
+use std::collections::BTreeMap;
+
+/// Most steps among which neighbours are looked for, and most of which they are.
+const STEPS: usize = 2000;
+const ASKED: usize = 400;
+
+/// Width of an observation from which on fewer steps are compared, and their numbers.
+const WIDE: usize = 100;
+const WIDE_STEPS: usize = 700;
+const WIDE_ASKED: usize = 160;
+
+/// Most inputs of the probe network.
+const MOST_INPUTS: usize = 300;
+
+/// Fewest pairs about which anything is said.
+const FEWEST: usize = 150;
+
+/// Largest distance between equal observations, in deviations.
+const EQUAL: f64 = 1e-4;
+
+/// Agreement beyond chance, 0 to 1, below which actions do not depend on observations.
+const NO_AGREEMENT: f64 = 0.05;
+
+/// Share of equal observations with other actions that no demonstrator has who acts by what is observed.
+const MOST_DISAGREEMENT: f64 = 0.5;
+
+/// How far the action of the nearest observation in another episode agrees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Agreement {
+    /// Pairs of steps that were compared.
+    pub pairs: usize,
+    /// Agreement beyond chance: 1 if neighbours always do the same, 0 if they agree as steps drawn at random.
+    pub beyond_chance: f64,
+    /// Agreement of steps drawn at random.
+    pub chance: f64,
+    /// Pairs whose observations are equal.
+    pub equal: usize,
+    /// Share of these whose actions differ.
+    pub differing: f64,
+}
+
+/// Share of actions that the full state predicts beyond the observation, from which on it decides.
+const MORE_BY_STATE: f64 = 0.25;
+
+/// One recorded step with the number of its episode.
+type Step<'a> = (usize, &'a [f32], &'a ActionValue);
+
+/// Compares each of some steps with the nearest one of another episode. `None` for too few steps.
+pub fn agreement(episodes: &[(Vec<&[f32]>, Vec<ActionValue>)]) -> Option<Agreement> {
+    let all: Vec<Step<'_>> = episodes
+        .iter()
+        .enumerate()
+        .flat_map(|(number, (rows, actions))| rows.iter().zip(actions).map(move |(row, action)| (number, *row, action)))
+        .collect();
+    let is_wide = all.first().is_some_and(|(_, row, _)| row.len() > WIDE);
+    let (most, asked) = if is_wide { (WIDE_STEPS, WIDE_ASKED) } else { (STEPS, ASKED) };
+    let steps: Vec<Step<'_>> = all.iter().step_by(all.len().div_ceil(most).max(1)).copied().collect();
+    let columns = statistics(steps.iter().map(|(_, row, _)| *row));
+    let scales: Vec<f64> = columns.iter().map(|column| column.deviation.max(1e-9)).collect();
+    let distance = |one: &[f32], other: &[f32], most: f64| {
+        let mut sum = 0.0;
+        for ((one, other), scale) in one.iter().zip(other).zip(&scales) {
+            sum += (f64::from(*one - *other) / scale).powi(2);
+            if sum > most {
+                return f64::INFINITY;
+            }
+        }
+        sum
+    };
+    let (mut agreed, mut pairs, mut equal, mut differing) = (0.0, 0_usize, 0_usize, 0_usize);
+    for (number, row, action) in steps.iter().step_by((steps.len() / asked).max(1)) {
+        let mut nearest: Option<(f64, &ActionValue)> = None;
+        for (other, other_row, other_action) in &steps {
+            if other == number || other_row.len() != row.len() {
+                continue;
+            }
+            let far = distance(row, other_row, nearest.map_or(f64::INFINITY, |(far, _)| far));
+            if nearest.is_none_or(|(most, _)| far < most) {
+                nearest = Some((far, other_action));
+            }
+        }
+        let Some((far, other_action)) = nearest else { continue };
+        pairs += 1;
+        agreed += likeness(action, other_action);
+        if far.sqrt() <= EQUAL {
+            equal += 1;
+            differing += usize::from(action != &other_action);
+        }
+    }
+    let chance = chance(&steps.iter().map(|(_, _, action)| *action).collect::<Vec<_>>());
+    let agreed = agreed / pairs.max(1) as f64;
+    let beyond_chance = match steps.first() {
+        Some((_, _, ActionValue::Continuous(_))) => 1.0 - agreed / chance.max(1e-12),
+        _ => (agreed - chance) / (1.0 - chance).max(1e-12),
+    };
+    let differing = differing as f64 / equal.max(1) as f64;
+    (pairs >= FEWEST).then_some(Agreement { pairs, beyond_chance, chance, equal, differing })
+}
+
+/// Returns 1 for equal discrete actions and 0 for others, or the squared distance of continuous ones.
+fn likeness(one: &ActionValue, other: &ActionValue) -> f64 {
+    match (one, other) {
+        (ActionValue::Continuous(one), ActionValue::Continuous(other)) => {
+            one.iter().zip(other).map(|(one, other)| f64::from(one - other).powi(2)).sum()
+        }
+        (one, other) => f64::from(u8::from(one == other)),
+    }
+}
+
+/// Returns the mean likeness of two steps drawn at random.
+fn chance(actions: &[&ActionValue]) -> f64 {
+    let count = actions.len().max(1) as f64;
+    match actions.first() {
+        Some(ActionValue::Continuous(first)) => (0..first.len())
+            .map(|at| {
+                let values = || {
+                    actions.iter().filter_map(move |action| match action {
+                        ActionValue::Continuous(values) => values.get(at).map(|value| f64::from(*value)),
+                        ActionValue::Discrete(_) => None,
+                    })
+                };
+                let average = mean(values()).unwrap_or_default();
+                2.0 * mean(values().map(|value| (value - average).powi(2))).unwrap_or_default()
+            })
+            .sum(),
+        _ => {
+            let mut counts = BTreeMap::<u32, f64>::new();
+            for action in actions {
+                if let ActionValue::Discrete(number) = action {
+                    *counts.entry(*number).or_default() += 1.0;
+                }
+            }
+            counts.values().map(|number| (number / count).powi(2)).sum()
+        }
+    }
+}
+
+/// Returns the share of recorded discrete actions that a probe network predicts from observations, and from observations
+/// with the full state. `None` without replays, without a state, or for too few steps.
+fn probed(evidence: &Evidence) -> Option<(f64, f64)> {
+    let set = evidence.recordings.as_ref()?;
+    let episodes: Vec<&PlayedEpisode> = replayed_episodes(set).collect();
+    let actions = episodes.iter().flat_map(|episode| &episode.actions).filter_map(|action| match action {
+        ActionValue::Discrete(number) => Some(*number as usize + 1),
+        ActionValue::Continuous(_) => None,
+    });
+    let actions = actions.max()?;
+    let steps = |is_asked: bool, with_state: bool| -> ProbeSteps {
+        let chosen = episodes.iter().enumerate().filter(|(number, _)| (number % 4 == 3) == is_asked);
+        let of_episode = |(_, episode): (usize, &&PlayedEpisode)| -> ProbeSteps {
+            // The state before an action is the one after the tick before it.
+            let rows = episode.rows().zip(&episode.actions).skip(1).zip(&episode.states);
+            rows.filter_map(|((row, action), state)| match action {
+                ActionValue::Discrete(number) => {
+                    let more = if with_state { state.as_slice() } else { &[] };
+                    Some(([row, more].concat(), *number as usize))
+                }
+                ActionValue::Continuous(_) => None,
+            })
+            .collect()
+        };
+        chosen.flat_map(of_episode).collect()
+    };
+    let has_state = episodes.iter().all(|episode| episode.states.first().is_some_and(|state| !state.is_empty()));
+    let is_narrow = |episode: &PlayedEpisode| episode.width + episode.states.first().map_or(0, Vec::len) <= MOST_INPUTS;
+    if !has_state || !episodes.iter().all(|episode| is_narrow(episode)) {
+        return None;
+    }
+    let seen = accuracy(&steps(false, false), &steps(true, false), actions)?;
+    let known = accuracy(&steps(false, true), &steps(true, true), actions)?;
+    Some((seen, known))
+}
+
+/// Checks whether the recorded actions depend on what was observed.
+pub fn check(evidence: &Evidence) -> Vec<LearningFinding> {
+    let Some(set) = &evidence.recordings else { return Vec::new() };
+    let seen = set.seen();
+    let Some(found) = agreement(&seen) else { return Vec::new() };
+    let noise = set.episodes.iter().map(|episode| episode.noise).fold(0.0, f64::max);
+    let is_discrete = seen.iter().any(|(_, actions)| matches!(actions.first(), Some(ActionValue::Discrete(_))));
+    let is_one = is_discrete && found.chance > 0.95 || !is_discrete && found.chance < 1e-6;
+    if !is_one && found.beyond_chance < NO_AGREEMENT {
+        let cause = match is_discrete && noise > 0.5 {
+            true => format!("{} of the recorded actions are random", percent(noise)),
+            false => "the demonstrator acts at random, or by something that agents do not observe".to_owned(),
+        };
+        return vec![LearningFinding::new(
+            Sign::Contradictory,
+            format!(
+                "in {} of steps with nearly the same observation, actions agree {} of the way from chance to always",
+                counted(found.pairs as u64, "pair"),
+                percent(found.beyond_chance.max(0.0))
+            ),
+            cause,
+            &[Advice::RecordAgain, Advice::ObserveMore],
+        )];
+    }
+    if is_discrete && found.equal >= FEWEST / 3 && found.differing > MOST_DISAGREEMENT.max(3.0 * noise) {
+        return vec![LearningFinding::new(
+            Sign::PartialObservation,
+            format!(
+                "{} of {} pairs of equal observations have different actions (noise {})",
+                percent(found.differing),
+                whole(found.equal as f64),
+                readable(noise)
+            ),
+            "the demonstrator sees something that the observation does not hold",
+            &[Advice::ObserveMore, Advice::RecordAgain],
+        )];
+    }
+    match probed(evidence) {
+        Some((seen, known)) if known - seen > MORE_BY_STATE => vec![LearningFinding::new(
+            Sign::PartialObservation,
+            format!(
+                "a probe network predicts {} of the recorded actions from the observation, and {} with the full state",
+                percent(seen),
+                percent(known)
+            ),
+            "what decides is in the state of the game, and not in the observation",
+            &[Advice::ObserveMore],
+        )],
+        _ => Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ten episodes of 40 steps whose action is a function of the observation and of the step.
+    fn episodes(action: impl Fn(usize, usize) -> u32) -> Vec<(Vec<f32>, Vec<ActionValue>)> {
+        (0..10)
+            .map(|episode| {
+                let rows = (0..40).map(|step| ((step * 7 + episode * 3) % 20) as f32).collect::<Vec<_>>();
+                let actions = (0..40)
+                    .map(|step| ActionValue::Discrete(action((step * 7 + episode * 3) % 20, step * 31 + episode * 17)));
+                (rows, actions.collect())
+            })
+            .collect()
+    }
+
+    fn measured(action: impl Fn(usize, usize) -> u32) -> Agreement {
+        let made = episodes(action);
+        let seen: Vec<_> = made.iter().map(|(rows, actions)| (rows.chunks(1).collect(), actions.clone())).collect();
+        agreement(&seen).expect("enough steps")
+    }
+
+    #[test]
+    fn actions_that_follow_from_observations_agree() {
+        let found = measured(|seen, _| u32::from(seen > 9));
+        assert!(found.beyond_chance > 0.99 && found.differing == 0.0, "{found:?}");
+        assert_eq!(found.equal, found.pairs, "every observation comes back");
+    }
+
+    #[test]
+    fn actions_that_follow_from_something_else_agree_by_chance() {
+        let found = measured(|_, hidden| (hidden as u32).wrapping_mul(2_654_435_761) >> 31);
+        assert!(found.beyond_chance.abs() < 0.2 && found.differing > 0.3, "{found:?}");
+        assert!((found.chance - 0.5).abs() < 0.05, "{found:?}");
+    }
+
+    #[test]
+    fn too_few_steps_say_nothing() {
+        let made = episodes(|_, _| 0);
+        let few: Vec<_> = made[..2].iter().map(|(rows, actions)| (rows.chunks(1).collect(), actions.clone())).collect();
+        assert_eq!(agreement(&few), None);
+    }
+}

@@ -1,0 +1,350 @@
+//! Evidence of a run, of recordings or of a game: reading, playing and probing.
+
+use crate::{
+    checkpoint::CheckpointChoice,
+    diagnose::{
+        evidence::Evidence,
+        forced::force,
+        networks::{probe, probe_decoder},
+        play::{PlayPlan, Played, PlayedEpisode, Seat, play},
+        recordings::RecordedSet,
+    },
+    error::RunError,
+    experiment::Experiment,
+    run_dir::{OpenedRun, RunDir},
+    runs::{RunCurves, RunsError},
+    trainer::TrainedLearner,
+};
+use bevy_playbot::{
+    bot::BlindBot, demo::file::DemoFileError, fault::Fault, policy::ActionDraw, skill_prior::SkillPrior,
+};
+use playbot_harness::{
+    doctor::{DoctorOptions, examine},
+    eval::Player,
+    game::{Game, idle_action},
+    level_files::is_level_files,
+    parallel::on_threads,
+    split::LevelSplit,
+};
+use playbot_learner::{DeviceKind, FileError, HasExitCode, LearnError, Policy, SkillModel};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Episodes of each player, and of the policy on training and on held-out levels.
+const EPISODES: u64 = 8;
+const POLICY_EPISODES: u64 = 16;
+
+/// Most ticks of each player, all agents together.
+const TICKS: usize = 6000;
+
+/// Ticks of each of the doctor's comparisons.
+const DOCTOR_TICKS: u32 = 60;
+
+/// Failure of a diagnosis. What is wrong with the game or the recordings is no failure but a finding.
+#[derive(Debug, Error)]
+pub enum DiagnoseError {
+    /// The run cannot be read.
+    #[error(transparent)]
+    Run(Box<RunError>),
+    /// Its metrics cannot be read.
+    #[error(transparent)]
+    Metrics(Box<RunsError>),
+    /// A recording cannot be read.
+    #[error(transparent)]
+    Recording(#[from] DemoFileError),
+    /// The policy of the run or the skill model cannot be read.
+    #[error(transparent)]
+    Learner(#[from] FileError),
+    /// A network gives no numbers, or does not fit.
+    #[error(transparent)]
+    Network(#[from] LearnError),
+    /// The doctor could not examine the game.
+    #[error(transparent)]
+    Game(#[from] Fault),
+}
+
+impl From<RunError> for DiagnoseError {
+    fn from(error: RunError) -> Self {
+        Self::Run(error.into())
+    }
+}
+
+impl From<RunsError> for DiagnoseError {
+    fn from(error: RunsError) -> Self {
+        Self::Metrics(error.into())
+    }
+}
+
+impl HasExitCode for DiagnoseError {
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Run(error) => error.exit_code(),
+            Self::Metrics(error) => error.exit_code(),
+            Self::Recording(error) => error.exit_code(),
+            Self::Learner(error) => error.exit_code(),
+            Self::Network(error) => error.exit_code(),
+            Self::Game(error) => error.exit_code(),
+        }
+    }
+}
+
+/// How far evidence is gathered.
+#[derive(Clone, Copy)]
+pub struct Gathering<'a> {
+    /// Play: blind bots, the demonstrator, the policy, recordings and the doctor. Else only files are read.
+    pub replays: bool,
+    /// Threads. They change no result.
+    pub threads: usize,
+    /// Device of networks.
+    pub device: DeviceKind,
+    /// Receives the name of each step before it.
+    pub progress: &'a (dyn Fn(&str) + Sync),
+    /// Returns the path of recordings from the one that an experiment names.
+    pub recordings: &'a dyn Fn(&Path) -> PathBuf,
+}
+
+/// Gathers evidence of a run, which may be in training.
+///
+/// # Errors
+///
+/// [`DiagnoseError`]: the run or its recordings cannot be read.
+pub fn of_run(
+    game: &dyn Game,
+    path: &Path,
+    skills: Option<&SkillModel>,
+    gathering: &Gathering<'_>,
+) -> Result<Evidence, DiagnoseError> {
+    (gathering.progress)("read the run");
+    let OpenedRun { run, experiment, info } = RunDir::open(path)?;
+    let mut evidence = begin(game, &experiment);
+    evidence.context.run = Some(path.display().to_string());
+    evidence.curves = Some(RunCurves::read(path)?);
+    let named = experiment.demos.as_deref().filter(|_| experiment.algorithm.learns_from_demos());
+    if let Some(named) = named {
+        let found = (gathering.recordings)(named);
+        match found.exists() {
+            true => read_recordings(&mut evidence, game, &found, gathering)?,
+            false => {
+                evidence.notes.push(format!("recordings are not looked at: there are none at {}", found.display()))
+            }
+        }
+    }
+    if let Some(version) = Some(info.game_version).filter(|version| *version != game.version()) {
+        evidence.notes.push(format!(
+            "the run is of version {version} of the rules, and the game has version {}: it is played as it is now",
+            game.version()
+        ));
+    }
+    if !gathering.replays {
+        evidence.notes.push("nothing was played: --replays looks at rewards, observations and actions, too".to_owned());
+        decode(&mut evidence, skills)?;
+        return Ok(evidence);
+    }
+    let policy = match run.checkpoint(CheckpointChoice::Last) {
+        Ok(checkpoint) if experiment.algorithm.is_trained() => {
+            let learner = TrainedLearner::load(info.algorithm, &checkpoint.learner_file(), gathering.device)?;
+            Some((learner.policy(), learner.skills().as_ref().map(SkillPrior::from)))
+        }
+        _ => {
+            evidence.notes.push("the policy does not play: there is no checkpoint yet".to_owned());
+            None
+        }
+    };
+    play_all(&mut evidence, game, policy.as_ref(), gathering)?;
+    decode(&mut evidence, skills)?;
+    Ok(evidence)
+}
+
+/// Gathers evidence of recordings, for an experiment of their game.
+///
+/// # Errors
+///
+/// [`DiagnoseError`]: a recording cannot be read.
+pub fn of_recordings(
+    game: &dyn Game,
+    experiment: &Experiment,
+    paths: &[PathBuf],
+    skills: Option<&SkillModel>,
+    gathering: &Gathering<'_>,
+) -> Result<Evidence, DiagnoseError> {
+    let mut evidence = begin(game, experiment);
+    let mut all: Option<RecordedSet> = None;
+    for path in paths {
+        let set = RecordedSet::read(path)?;
+        match &mut all {
+            Some(all) => all.join(set),
+            None => all = Some(set),
+        }
+    }
+    if let Some(set) = all {
+        evidence.context.demos = Some(set.path.display().to_string());
+        add_recordings(&mut evidence, game, set, gathering);
+    }
+    decode(&mut evidence, skills)?;
+    Ok(evidence)
+}
+
+/// Gathers evidence of a game under an experiment, before anything is trained: blind bots and the demonstrator play it.
+///
+/// # Errors
+///
+/// [`DiagnoseError`]: its recordings cannot be read.
+pub fn of_game(
+    game: &dyn Game,
+    experiment: &Experiment,
+    skills: Option<&SkillModel>,
+    gathering: &Gathering<'_>,
+) -> Result<Evidence, DiagnoseError> {
+    let mut evidence = begin(game, experiment);
+    let named = experiment.demos.as_deref().filter(|_| experiment.algorithm.learns_from_demos());
+    if let Some(found) = named.map(gathering.recordings) {
+        match found.exists() {
+            true => read_recordings(&mut evidence, game, &found, gathering)?,
+            false => {
+                evidence.notes.push(format!("recordings are not looked at: there are none at {}", found.display()))
+            }
+        }
+    }
+    // Settings alone are checked as at the start of a run.
+    evidence.curves = Some(RunCurves::default());
+    play_all(&mut evidence, game, None, gathering)?;
+    decode(&mut evidence, skills)?;
+    Ok(evidence)
+}
+
+fn begin(game: &dyn Game, experiment: &Experiment) -> Evidence {
+    let mut evidence = Evidence::new(experiment, game.version());
+    if !experiment.observation_config().is_image() {
+        evidence.names = game.observation().names;
+    }
+    evidence.action_names = game.tools().input.action_names();
+    evidence
+}
+
+fn read_recordings(
+    evidence: &mut Evidence,
+    game: &dyn Game,
+    path: &Path,
+    gathering: &Gathering<'_>,
+) -> Result<(), DiagnoseError> {
+    let set = RecordedSet::read(path)?;
+    add_recordings(evidence, game, set, gathering);
+    Ok(())
+}
+
+fn add_recordings(evidence: &mut Evidence, game: &dyn Game, mut set: RecordedSet, gathering: &Gathering<'_>) {
+    if gathering.replays {
+        (gathering.progress)("replay recordings");
+    }
+    if let Err(fault) = set.look_up(game, gathering.replays) {
+        evidence.faults.push(fault);
+    }
+    let family = |mode: &str| game.tools().levels.family(mode);
+    let trained = &evidence.experiment.train.mode;
+    if !is_level_files(trained) {
+        let is_other = |mode: &&str| !is_level_files(mode) && family(mode) != family(trained);
+        let modes: std::collections::BTreeSet<&str> = set.episodes.iter().map(|episode| &*episode.mode).collect();
+        evidence.other_modes = modes.into_iter().filter(is_other).map(str::to_owned).collect();
+    }
+    evidence.recordings = Some(set);
+}
+
+/// Lets all players play, forces actions, probes the policy and calls the doctor.
+fn play_all(
+    evidence: &mut Evidence,
+    game: &dyn Game,
+    policy: Option<&(Policy, Option<SkillPrior>)>,
+    gathering: &Gathering<'_>,
+) -> Result<(), DiagnoseError> {
+    (gathering.progress)("play");
+    let experiment = evidence.experiment.clone();
+    let mut jobs = jobs(game, &experiment, policy);
+    let of_job = |(seat, player, plan): &mut (Seat, Player, PlayPlan)| play(game, *seat, player, plan);
+    evidence.played = on_threads(&mut jobs, gathering.threads, of_job);
+    let faults = evidence.played.iter().filter_map(|played| played.fault.clone());
+    evidence.faults.extend(faults);
+    if evidence.faults.is_empty() {
+        (gathering.progress)("force actions");
+        force_actions(evidence, game);
+        (gathering.progress)("examine the game");
+        examine_game(evidence, game);
+    }
+    if let Some((policy, prior)) = policy {
+        let rows: Vec<&[f32]> =
+            evidence.played.iter().flat_map(|played| &played.episodes).flat_map(PlayedEpisode::rows).collect();
+        evidence.networks = match experiment.observation_config().is_image() {
+            true => None,
+            false => probe(policy, prior.as_ref(), &rows)?,
+        };
+    }
+    Ok(())
+}
+
+/// Returns the players with their plans.
+fn jobs(
+    game: &dyn Game,
+    experiment: &Experiment,
+    policy: Option<&(Policy, Option<SkillPrior>)>,
+) -> Vec<(Seat, Player, PlayPlan)> {
+    let plan = |split: &LevelSplit, episodes: u64| PlayPlan {
+        mode: split.mode.clone(),
+        // Levels over the whole range, since the first ones may be alike.
+        levels: (0..episodes.min(split.len())).map(|at| split.first + at * (split.len() / episodes).max(1)).collect(),
+        observation: experiment.observation_config(),
+        seed: experiment.seed,
+        ticks: TICKS,
+    };
+    let mut jobs = vec![
+        (Seat::Random, Player::Blind(BlindBot::Uniform), plan(&experiment.train, EPISODES)),
+        (Seat::Chaos, Player::Blind(BlindBot::Chaos), plan(&experiment.train, EPISODES)),
+        (Seat::Idle, Player::Blind(BlindBot::Constant(idle_action(game))), plan(&experiment.train, EPISODES)),
+    ];
+    if game.tools().bots.demonstrator().is_some() {
+        jobs.push((Seat::Demonstrator, Player::Demonstrator, plan(&experiment.train, EPISODES)));
+    }
+    if let Some((policy, prior)) = policy {
+        let player = Player::Policy { policy: policy.clone(), prior: prior.clone(), draw: ActionDraw::Sample };
+        jobs.push((Seat::Policy, player.clone(), plan(&experiment.train, POLICY_EPISODES)));
+        jobs.push((Seat::HeldOut, player, plan(&experiment.test, POLICY_EPISODES)));
+    }
+    jobs
+}
+
+/// Forces actions from moments of the demonstrator's longest episode, or else of chaos.
+fn force_actions(evidence: &mut Evidence, game: &dyn Game) {
+    let longest = |played: &Played| played.episodes.iter().max_by_key(|episode| episode.ticks()).cloned();
+    let course = [Seat::Demonstrator, Seat::Chaos].into_iter().find_map(|seat| longest(evidence.played(seat)?));
+    let Some(course) = course else { return };
+    match force(game, &evidence.experiment.train.mode, &course) {
+        Ok(forced) => evidence.forced = forced,
+        Err(fault) => evidence.faults.push(fault.to_string()),
+    }
+}
+
+fn examine_game(evidence: &mut Evidence, game: &dyn Game) {
+    let (mode, level) = (evidence.experiment.train.mode.clone(), evidence.experiment.train.first);
+    let options = DoctorOptions { ticks: DOCTOR_TICKS, level, ..DoctorOptions::new(mode) };
+    match examine(game, &options, |_| {}) {
+        Ok(report) if report.is_healthy() => {}
+        Ok(report) => {
+            let different = report.comparisons.iter().filter(|comparison| comparison.same() == Some(false));
+            let words = different.filter(|comparison| !comparison.is_note()).map(|comparison| {
+                let value = comparison.difference().map_or_else(String::new, |found| format!(" in `{}`", found.name));
+                format!("{}{value}", comparison.comparison.describe())
+            });
+            let words = words.collect::<Vec<_>>().join("; ");
+            evidence.doctor = Some(if words.is_empty() { "the doctor found a difference".to_owned() } else { words });
+        }
+        Err(fault) => evidence.faults.push(fault.to_string()),
+    }
+}
+
+/// Compares a skill model with the recordings.
+fn decode(evidence: &mut Evidence, skills: Option<&SkillModel>) -> Result<(), DiagnoseError> {
+    let (Some(model), Some(set)) = (skills, &evidence.recordings) else { return Ok(()) };
+    let seen = set.seen();
+    let steps: Vec<_> =
+        seen.iter().flat_map(|(rows, actions)| rows.iter().copied().zip(actions.iter().cloned())).collect();
+    evidence.decoder = probe_decoder(model, &steps)?;
+    Ok(())
+}

@@ -1,0 +1,354 @@
+//! Checks of settings and metrics, cheap enough for every update of a training.
+
+use crate::{
+    diagnose::{
+        advice::Advice,
+        evidence::{discount_and_norm, recent},
+        finding::{LearningFinding, Sign},
+    },
+    experiment::{Algorithm, Experiment, LearnerKind},
+    metrics_log::{EPISODES, EPISODIC_LENGTH, EPISODIC_RETURN, SUCCESS_RATE, is_settled},
+    runs::RunCurves,
+};
+use playbot_report::{readable, whole};
+
+/// Updates over which a metric is averaged.
+const RECENT: usize = 5;
+
+/// Learning rates beyond which networks of this size keep nothing: a hundred times the default.
+const HIGHEST_RATE: f64 = 0.02;
+/// Bounds of a mean KL divergence and clip share in an update. Schulman et al. (2017) aim at 0.003 to 0.03.
+const LARGEST_KL: f64 = 0.5;
+const LARGEST_CLIP_SHARE: f64 = 0.8;
+const SMALLEST_KL: f64 = 1e-6;
+/// An entropy bonus of this weight outweighs advantages that are normalised to a deviation of 1.
+const LARGEST_ENTROPY_WEIGHT: f64 = 0.5;
+/// A value loss beyond what returns of deviation 1 cost.
+const LARGEST_VALUE_LOSS: f64 = 2.0;
+/// A penalty of this weight outweighs them too.
+const LARGEST_PENALTY: f64 = 5.0;
+/// A horizon of fewer ticks is short wherever episodes are longer.
+const SHORT_HORIZON: f64 = 10.0;
+/// Mean reward of a tick that is large without normalisation.
+const LARGE_REWARD: f64 = 100.0;
+/// Ticks of one arena in which at least one episode should end.
+const LONG_EPISODE: u64 = 20_000;
+
+/// Checks the settings and the metrics of a run. The order of the findings says nothing.
+pub fn check(experiment: &Experiment, curves: &RunCurves) -> Vec<LearningFinding> {
+    let tag = |name: &str| {
+        let own = curves.curve(&format!("losses/{name}"));
+        if own.is_empty() { curves.curve(&format!("spirl/{name}")) } else { own }
+    };
+    let success = curves.last(SUCCESS_RATE);
+    let succeeds = success.is_some_and(|rate| rate >= 0.5);
+    // Random actions may reach an easy goal in half of the episodes.
+    let is_solved = success.is_some_and(|rate| rate >= 0.9);
+    let mut found = settings(experiment, &tag);
+    if experiment.algorithm.learner() == LearnerKind::Ppo {
+        found.extend(steps_of_policy(experiment, &tag, succeeds, is_solved));
+        found.extend(critic(experiment, &tag, succeeds));
+        found.extend(collapse(experiment, &tag, succeeds));
+    }
+    found.extend(rewards(experiment, curves, &tag));
+    found.extend(episodes(experiment, curves));
+    found
+}
+
+type Tag<'a> = dyn Fn(&str) -> &'a [(u64, f64)] + 'a;
+
+fn last(tag: &Tag<'_>, name: &str) -> String {
+    tag(name).last().map_or("unknown".to_owned(), |(_, value)| readable(*value))
+}
+
+fn settings(experiment: &Experiment, tag: &Tag<'_>) -> Vec<LearningFinding> {
+    let Experiment { ppo, sac, score, algorithm, .. } = experiment;
+    let mut found = Vec::new();
+    let (rates, is_ppo) = match algorithm.learner() {
+        LearnerKind::Ppo => (vec![("ppo.lr", ppo.lr)], true),
+        LearnerKind::Sac => (vec![("sac.actor_lr", sac.actor_lr), ("sac.critic_lr", sac.critic_lr)], false),
+    };
+    for (key, rate) in rates.into_iter().filter(|(_, rate)| *rate >= HIGHEST_RATE) {
+        found.push(LearningFinding::new(
+            Sign::LearningRate,
+            format!(
+                "`{key}` is {}, and the last KL divergence of an update is {}",
+                readable(rate),
+                last(tag, "approx_kl")
+            ),
+            "each step overwrites what the steps before have learned",
+            &[Advice::LowerRate],
+        ));
+    }
+    if is_ppo && *algorithm != Algorithm::SpirlPpo && ppo.ent_coef >= LARGEST_ENTROPY_WEIGHT {
+        found.push(LearningFinding::new(
+            Sign::EntropyWeight,
+            format!("`ppo.ent_coef` is {}, and the last entropy is {}", readable(ppo.ent_coef), last(tag, "entropy")),
+            "random actions earn more of the bonus than the reward can outweigh",
+            &[Advice::LowerEntropy],
+        ));
+    }
+    let is_score = matches!(algorithm, Algorithm::ScorePpo | Algorithm::ScoreSac);
+    if is_score && score.kl && score.kl_coef.min(score.kl_coef_end.unwrap_or(score.kl_coef)) >= LARGEST_PENALTY {
+        found.push(LearningFinding::new(
+            Sign::HeldByDecoder,
+            format!("`score.kl_coef` is {}, fifty times its default or more", readable(score.kl_coef)),
+            "leaving the decoder costs more than any reward pays",
+            &[Advice::LowerPenalty],
+        ));
+    }
+    found
+}
+
+fn steps_of_policy(experiment: &Experiment, tag: &Tag<'_>, succeeds: bool, is_solved: bool) -> Vec<LearningFinding> {
+    let ppo = &experiment.ppo;
+    let mut found = Vec::new();
+    let learned = tag("approx_kl").len() as u64;
+    let (kl, clip) = (recent(tag("approx_kl"), 3), recent(tag("clip_fraction"), 3));
+    if let (Some(kl), Some(clip)) = (kl, clip)
+        && learned >= ppo.critic_warmup + 3
+    {
+        let evidence = format!(
+            "in the last 3 updates the KL divergence is {} and {} of the actions are clipped",
+            readable(kl),
+            readable(clip)
+        );
+        if kl.abs() < SMALLEST_KL && clip == 0.0 && !is_solved {
+            let (cause, advice) = match () {
+                () if ppo.lr < 1e-5 => (format!("`ppo.lr` is {}", readable(ppo.lr)), vec![Advice::RaiseRate]),
+                () if ppo.max_grad_norm < 1e-3 => {
+                    let bound = readable(ppo.max_grad_norm);
+                    (
+                        format!("`ppo.max_grad_norm` is {bound}: gradients are cut to nothing"),
+                        vec![Advice::AllowGradients],
+                    )
+                }
+                () => {
+                    let norm = last(tag, "grad_norm");
+                    let words = format!("nothing in a rollout is better than the rest (the gradient is {norm})");
+                    (words, vec![Advice::MeasureBots, Advice::RaiseRate])
+                }
+            };
+            found.push(LearningFinding::new(Sign::Unmoved, evidence, cause, &advice));
+        } else if !succeeds && (kl > LARGEST_KL || clip > LARGEST_CLIP_SHARE) {
+            let cause = format!("`ppo.lr` = {} or `ppo.epochs` = {} is too much", readable(ppo.lr), ppo.epochs);
+            found.push(LearningFinding::new(
+                Sign::MovesTooFar,
+                evidence,
+                cause,
+                &[Advice::LowerRate, Advice::FewerPasses],
+            ));
+        }
+    }
+    found
+}
+
+fn critic(experiment: &Experiment, tag: &Tag<'_>, succeeds: bool) -> Option<LearningFinding> {
+    let explained = recent(tag("explained_variance"), RECENT);
+    let ppo = &experiment.ppo;
+    let words = explained.map_or("unknown".to_owned(), readable);
+    if ppo.vf_coef < 1e-4 {
+        return Some(LearningFinding::new(
+            Sign::BlindCritic,
+            format!("`ppo.vf_coef` is {}, and the explained variance is {words}", readable(ppo.vf_coef)),
+            "nothing trains the critic, so advantages are noise",
+            &[Advice::TrainCritic],
+        ));
+    }
+    // Where nearly nothing is paid, estimates near 0 explain less than nothing, and do no harm.
+    let is_costly = recent(tag("value_loss"), RECENT).is_some_and(|loss| loss > LARGEST_VALUE_LOSS);
+    explained.filter(|explained| *explained < -1.0 && is_costly && !succeeds).map(|_| {
+        LearningFinding::new(
+            Sign::BlindCritic,
+            format!(
+                "the explained variance of the last {RECENT} updates is {words}; the value loss is {}",
+                last(tag, "value_loss")
+            ),
+            "returns are far outside of what the critic estimates: their scale changes, or it learns too fast",
+            &[Advice::NormaliseRewards, Advice::LowerRate],
+        )
+    })
+}
+
+fn collapse(experiment: &Experiment, tag: &Tag<'_>, succeeds: bool) -> Option<LearningFinding> {
+    if experiment.algorithm.needs_skills() || succeeds {
+        // The decoder of a demonstrator without noise has hardly any entropy, and is not collapsed.
+        return None;
+    }
+    let curve = tag("entropy");
+    let (first, now) = (curve.first()?.1, recent(curve, 3)?);
+    (first > 0.0 && now < 0.02 * first).then(|| {
+        LearningFinding::new(
+            Sign::Collapsed,
+            format!("the entropy fell from {} to {}, and the goal is rarely reached", readable(first), readable(now)),
+            "the policy was certain before it knew, and tries nothing else",
+            &[Advice::RaiseEntropy, Advice::LowerRate],
+        )
+    })
+}
+
+fn rewards(experiment: &Experiment, curves: &RunCurves, tag: &Tag<'_>) -> Vec<LearningFinding> {
+    let mut found = Vec::new();
+    let (_, is_normalised) = discount_and_norm(experiment);
+    let episodes = curves.last(EPISODES).unwrap_or_default();
+    let returns = curves.curve(EPISODIC_RETURN);
+    if is_settled(episodes as u64) && !returns.is_empty() && returns.iter().all(|(_, value)| *value == 0.0) {
+        found.push(LearningFinding::new(
+            Sign::NoReward,
+            format!("none of {} episodes had any reward", whole(episodes)),
+            "the goal is not reached by chance, or the game never pays",
+            &[Advice::UseRecordings, Advice::PayReward],
+        ));
+    }
+    let (total, length) = (curves.last(EPISODIC_RETURN), curves.last(EPISODIC_LENGTH));
+    if let (Some(total), Some(length), false) = (total, length, is_normalised)
+        && total.abs() > LARGE_REWARD
+        && (total.abs() / length.max(1.0) > LARGE_REWARD || recent(tag("value_loss"), 3).is_some_and(|loss| loss > 1e4))
+    {
+        let loss = last(tag, "value_loss");
+        found.push(LearningFinding::new(
+            Sign::RewardScale,
+            format!("an episode earns {} in {} ticks, and the value loss is {loss}", readable(total), whole(length)),
+            "rewards far from 1 are not normalised, so the critic's loss drowns the policy's",
+            &[Advice::NormaliseRewards, Advice::ScaleInGame],
+        ));
+    }
+    found
+}
+
+fn episodes(experiment: &Experiment, curves: &RunCurves) -> Vec<LearningFinding> {
+    let mut found = Vec::new();
+    let (gamma, _) = discount_and_norm(experiment);
+    let horizon = 1.0 / (1.0 - gamma).max(1e-9);
+    if let Some(length) = curves.last(EPISODIC_LENGTH)
+        && horizon < SHORT_HORIZON
+        && length > 2.0 * horizon
+    {
+        found.push(LearningFinding::new(
+            Sign::ShortHorizon,
+            format!("γ = {gamma} looks {} ticks ahead, and an episode has {} ticks", readable(horizon), whole(length)),
+            "a reward at the end does not reach the actions that lead there",
+            &[Advice::LookAhead],
+        ));
+    }
+    let ticks = curves.last_step() / u64::from(experiment.arenas.max(1));
+    if curves.last(EPISODES) == Some(0.0) && ticks > LONG_EPISODE {
+        found.push(LearningFinding::new(
+            Sign::NoEpisodes,
+            format!("no episode has ended in {} ticks of each arena", whole(ticks as f64)),
+            "the game ends no episode, and has no time limit",
+            &[Advice::RaiseTimeLimit],
+        ));
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::file::parse_experiment;
+    use std::path::Path;
+
+    fn experiment(algorithm: &str, rest: &str) -> Experiment {
+        let text = format!(
+            r#"(game: "coinrun", train: "hard:0..63", test: "hard:64..127", demos: "d", steps: 1000, algorithm: "{algorithm}", {rest})"#
+        );
+        parse_experiment(&text, Path::new("x.ron")).expect("valid")
+    }
+
+    /// Curves with the same value in ten updates of 1000 steps.
+    fn curves(values: &[(&str, f64)]) -> RunCurves {
+        let mut curves = RunCurves::default();
+        for update in 1..=10 {
+            let healthy = [
+                (EPISODES, 200.0),
+                (EPISODIC_RETURN, 1.0),
+                (EPISODIC_LENGTH, 50.0),
+                (SUCCESS_RATE, 0.1),
+                ("losses/approx_kl", 0.01),
+                ("losses/clip_fraction", 0.1),
+                ("losses/entropy", 1.0),
+                ("losses/explained_variance", 0.3),
+                ("losses/value_loss", 0.1),
+                ("losses/grad_norm", 0.4),
+            ];
+            let value_of = |(tag, value): (&'static str, f64)| {
+                let changed = values.iter().find(|(changed, _)| *changed == tag);
+                (tag, changed.map_or(value, |(_, value)| *value))
+            };
+            curves.push(1000 * update, healthy.into_iter().map(value_of));
+        }
+        curves
+    }
+
+    fn signs(experiment: &Experiment, values: &[(&str, f64)]) -> Vec<Sign> {
+        check(experiment, &curves(values)).into_iter().map(|finding| finding.sign).collect()
+    }
+
+    #[test]
+    fn healthy_metrics_give_no_warning() {
+        for algorithm in ["ppo", "score-ppo", "sac", "spirl-ppo", "rlpd"] {
+            assert_eq!(signs(&experiment(algorithm, ""), &[]), [], "{algorithm}");
+        }
+    }
+
+    #[test]
+    fn each_wrong_setting_is_found() {
+        for (algorithm, settings, sign) in [
+            ("ppo", "ppo: (lr: 1.0)", Sign::LearningRate),
+            ("sac", "sac: (actor_lr: 1.0)", Sign::LearningRate),
+            ("ppo", "ppo: (ent_coef: 5.0)", Sign::EntropyWeight),
+            ("score-ppo", "score: (kl_coef: 1000.0)", Sign::HeldByDecoder),
+            ("ppo", "ppo: (vf_coef: 0.0)", Sign::BlindCritic),
+            ("ppo", "ppo: (gamma: 0.5)", Sign::ShortHorizon),
+            ("sac", "sac: (gamma: 0.5)", Sign::ShortHorizon),
+        ] {
+            assert_eq!(signs(&experiment(algorithm, settings), &[]), [sign], "{settings}");
+        }
+        assert_eq!(signs(&experiment("score-ppo", "score: (kl: false, kl_coef: 1000.0)"), &[]), [], "it is off");
+    }
+
+    #[test]
+    fn each_sign_of_metrics_is_found() {
+        let ppo = experiment("ppo", "");
+        let still = [("losses/approx_kl", 0.0), ("losses/clip_fraction", 0.0)];
+        assert_eq!(signs(&ppo, &still), [Sign::Unmoved]);
+        let solved = [("losses/approx_kl", 0.0), ("losses/clip_fraction", 0.0), (SUCCESS_RATE, 0.99)];
+        assert_eq!(signs(&ppo, &solved), [], "it has nothing to learn");
+        assert_eq!(signs(&ppo, &[("losses/approx_kl", 2.0)]), [Sign::MovesTooFar]);
+        let far = [("losses/explained_variance", -3.0), ("losses/value_loss", 9.0)];
+        assert_eq!(signs(&ppo, &far), [Sign::BlindCritic]);
+        assert_eq!(signs(&ppo, &[("losses/explained_variance", -3.0)]), [], "hardly anything is paid");
+        assert_eq!(signs(&ppo, &[(EPISODIC_RETURN, 0.0)]), [Sign::NoReward]);
+        assert_eq!(signs(&ppo, &[(EPISODIC_RETURN, 0.0), (EPISODES, 99.0)]), [], "too few episodes to say so");
+        let raw = experiment("ppo", "ppo: (norm_reward: false)");
+        assert_eq!(signs(&raw, &[(EPISODIC_RETURN, 10_000.0)]), [Sign::RewardScale]);
+        assert_eq!(signs(&ppo, &[(EPISODIC_RETURN, 10_000.0)]), [], "they are normalised");
+        let long = RunCurves::default();
+        assert!(check(&ppo, &long).is_empty(), "nothing is known yet");
+    }
+
+    #[test]
+    fn the_cause_of_a_policy_that_stands_still_is_the_setting_that_holds_it() {
+        let still = curves(&[("losses/approx_kl", 0.0), ("losses/clip_fraction", 0.0)]);
+        for (settings, words) in [
+            ("ppo: (lr: 0.000000001)", "`ppo.lr` is"),
+            ("ppo: (max_grad_norm: 0.00000001)", "`ppo.max_grad_norm` is"),
+            ("", "nothing in a rollout is better"),
+        ] {
+            let found = check(&experiment("ppo", settings), &still);
+            assert!(found[0].cause.contains(words), "{}", found[0].cause);
+        }
+    }
+
+    #[test]
+    fn entropy_that_falls_to_nothing_is_a_collapse() {
+        let mut curves = curves(&[]);
+        for update in 11..=14 {
+            curves.push(1000 * update, [("losses/entropy", 0.001)].into_iter());
+        }
+        let found = check(&experiment("ppo", ""), &curves);
+        assert_eq!(found.iter().map(|finding| finding.sign).collect::<Vec<_>>(), [Sign::Collapsed]);
+        assert!(check(&experiment("score-ppo", ""), &curves).is_empty(), "a decoder may be certain");
+    }
+}

@@ -1,0 +1,303 @@
+//! Checks of observations: values that never change, are not finite, differ much in scale, or are not those that were
+//! recorded.
+
+use crate::diagnose::{
+    advice::Advice,
+    evidence::{Evidence, list},
+    finding::{LearningFinding, Sign},
+    play::{Played, PlayedEpisode, Seat},
+};
+use playbot_report::{counted, percent, readable, whole};
+
+/// Sizes of values that networks learn from without a normaliser. Constant values of another size do no harm.
+const FIT: std::ops::RangeInclusive<f32> = 1e-3..=100.0;
+
+/// Deviations from the mean at which normalisers clip.
+const CLIPPED_AT: f64 = 10.0;
+
+/// Share of values beyond that bound which is too large.
+const MOST_CLIPPED: f64 = 0.02;
+
+/// Share of the recorded rows in which a value must be another one than the constant that is played.
+const OFTEN: f64 = 0.2;
+
+/// Fewest rows about which a statistic says something.
+const FEWEST_ROWS: usize = 50;
+
+/// Statistics of one observed value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ColumnStatistics {
+    /// Rows.
+    pub rows: usize,
+    /// Rows in which it is not finite.
+    pub not_finite: usize,
+    /// Smallest value.
+    pub min: f32,
+    /// Largest value.
+    pub max: f32,
+    /// Mean of the finite values.
+    pub mean: f64,
+    /// Their deviation.
+    pub deviation: f64,
+}
+
+impl ColumnStatistics {
+    fn is_constant(&self) -> bool {
+        self.rows > 0 && self.min == self.max
+    }
+
+    fn size(&self) -> f32 {
+        self.min.abs().max(self.max.abs())
+    }
+}
+
+/// Returns the statistics of each value over rows of equal length.
+pub fn statistics<'a>(rows: impl Iterator<Item = &'a [f32]>) -> Vec<ColumnStatistics> {
+    let mut sums: Vec<(f64, f64)> = Vec::new();
+    let mut columns: Vec<ColumnStatistics> = Vec::new();
+    for row in rows {
+        if columns.is_empty() {
+            let (min, max) = (f32::INFINITY, f32::NEG_INFINITY);
+            let empty = ColumnStatistics { rows: 0, not_finite: 0, min, max, mean: 0.0, deviation: 0.0 };
+            columns = vec![empty; row.len()];
+            sums = vec![(0.0, 0.0); row.len()];
+        }
+        if row.len() != columns.len() {
+            continue;
+        }
+        for ((column, sum), &value) in columns.iter_mut().zip(&mut sums).zip(row) {
+            column.rows += 1;
+            if !value.is_finite() {
+                column.not_finite += 1;
+                continue;
+            }
+            (column.min, column.max) = (column.min.min(value), column.max.max(value));
+            (sum.0, sum.1) = (sum.0 + f64::from(value), sum.1 + f64::from(value).powi(2));
+        }
+    }
+    for (column, (sum, squares)) in columns.iter_mut().zip(sums) {
+        let count = (column.rows - column.not_finite).max(1) as f64;
+        column.mean = sum / count;
+        column.deviation = (squares / count - column.mean.powi(2)).max(0.0).sqrt();
+    }
+    columns
+}
+
+/// Checks what agents observe.
+pub fn check(evidence: &Evidence) -> Vec<LearningFinding> {
+    let rows = || evidence.played.iter().flat_map(|played| &played.episodes).flat_map(PlayedEpisode::rows);
+    let columns = statistics(rows());
+    let recorded = recorded(evidence, columns.len());
+    let mut found = not_finite(evidence, &columns);
+    if columns.first().is_none_or(|column| column.rows < FEWEST_ROWS) {
+        return found;
+    }
+    found.extend(constant(evidence, &columns));
+    found.extend(scales(evidence, &columns));
+    found.extend(not_as_recorded(evidence, &recorded));
+    found
+}
+
+/// Returns the share of the recorded rows in which a value is another one than this.
+fn recorded_share(evidence: &Evidence, number: usize, value: f32) -> f64 {
+    let Some(set) = &evidence.recordings else { return 0.0 };
+    let is_same = set.names.is_empty() || set.names == evidence.names;
+    let kept =
+        set.episodes.iter().filter(|episode| episode.width == evidence.names.len() && is_same && episode.width > 0);
+    let (mut rows, mut others) = (0_u64, 0_u64);
+    for row in kept.flat_map(|episode| episode.episode.observations.chunks(episode.width)) {
+        rows += 1;
+        others += u64::from(row[number] != value);
+    }
+    others as f64 / rows.max(1) as f64
+}
+
+/// Returns the statistics of the recorded values, if they are those of the game's sensor.
+fn recorded(evidence: &Evidence, width: usize) -> Vec<ColumnStatistics> {
+    let Some(set) = &evidence.recordings else { return Vec::new() };
+    let is_same = set.names.is_empty() || set.names == evidence.names;
+    let kept = set.episodes.iter().filter(|episode| episode.width == width && is_same && width > 0);
+    statistics(kept.flat_map(|episode| episode.episode.observations.chunks(episode.width)))
+}
+
+fn not_finite(evidence: &Evidence, columns: &[ColumnStatistics]) -> Vec<LearningFinding> {
+    let bad = columns.iter().enumerate().filter(|(_, column)| column.not_finite > 0);
+    let names: Vec<String> = bad.map(|(number, _)| evidence.value_name(number)).collect();
+    let mut found = Vec::new();
+    let told = evidence.faults.iter().find(|fault| fault.contains("not finite") || fault.contains("NaN"));
+    if !names.is_empty() || told.is_some() {
+        let words = told.cloned().unwrap_or_else(|| format!("{} is NaN or infinite", list(&names)));
+        found.push(LearningFinding::new(
+            Sign::NotFinite,
+            words,
+            "a division by 0, a root of a negative number or a value that is not set yet",
+            &[Advice::FillObservation],
+        ));
+    }
+    found
+}
+
+fn constant(evidence: &Evidence, columns: &[ColumnStatistics]) -> Option<LearningFinding> {
+    let constants: Vec<usize> = (0..columns.len()).filter(|&number| columns[number].is_constant()).collect();
+    let rows = columns.first().map_or(0, |column| column.rows);
+    let varied: Vec<usize> = constants
+        .iter()
+        .copied()
+        .filter(|&number| recorded_share(evidence, number, columns[number].min) >= OFTEN)
+        .collect();
+    let shown = if varied.is_empty() { &constants } else { &varied };
+    let names: Vec<String> = shown.iter().map(|&number| evidence.value_name(number)).collect();
+    let all = constants.len() == columns.len();
+    if !all && varied.is_empty() {
+        return None;
+    }
+    let which = match (all, varied.is_empty()) {
+        (true, _) => format!("all {} observed values", columns.len()),
+        (false, _) => format!("{} of {} observed values, which vary in the recordings", varied.len(), columns.len()),
+    };
+    Some(LearningFinding::new(
+        Sign::ConstantObservation,
+        format!(
+            "{which} are the same in all {} ticks of {} players: {}",
+            whole(rows as f64),
+            evidence.played.len(),
+            list(&names)
+        ),
+        "the sensor is not filled, reads another entity, or is filled once",
+        &[Advice::FillObservation, Advice::ObserveMore],
+    ))
+}
+
+fn scales(evidence: &Evidence, columns: &[ColumnStatistics]) -> Option<LearningFinding> {
+    if evidence.is_normalised() || evidence.names.is_empty() {
+        return None;
+    }
+    let is_strange =
+        |column: &ColumnStatistics| !column.is_constant() && column.size() > 0.0 && !FIT.contains(&column.size());
+    let strange: Vec<String> = columns
+        .iter()
+        .enumerate()
+        .filter(|(_, column)| is_strange(column))
+        .map(|(number, column)| {
+            format!("{} (up to {})", evidence.value_name(number), readable(f64::from(column.size())))
+        })
+        .collect();
+    let sizes = columns.iter().filter(|column| !column.is_constant()).map(|column| f64::from(column.size()));
+    let (small, large) =
+        sizes.fold((f64::INFINITY, 0.0_f64), |(small, large), size| (small.min(size), large.max(size)));
+    (!strange.is_empty()).then(|| {
+        LearningFinding::new(
+            Sign::ObservationScale,
+            format!(
+                "{} beside values up to {}; no normaliser is on",
+                list(&strange),
+                readable(if strange.len() == 1 && large > 100.0 { small } else { large })
+            ),
+            "large values drown small ones in the first layer",
+            &[Advice::NormaliseObservations, Advice::ScaleInGame],
+        )
+    })
+}
+
+/// Compares what the demonstrator observes now, or else the policy, with what was recorded.
+fn not_as_recorded(evidence: &Evidence, recorded: &[ColumnStatistics]) -> Vec<LearningFinding> {
+    let now = [Seat::Demonstrator, Seat::Policy].into_iter().find_map(|seat| evidence.played(seat));
+    let (Some(Played { seat, episodes, .. }), false) = (now, recorded.is_empty()) else { return Vec::new() };
+    let (mut beyond, mut values) = (vec![0_usize; recorded.len()], 0_usize);
+    for row in episodes.iter().flat_map(PlayedEpisode::rows).filter(|row| row.len() == recorded.len()) {
+        values += 1;
+        for ((count, column), value) in beyond.iter_mut().zip(recorded).zip(row) {
+            // A value that is rarely recorded lies many deviations from the mean, too.
+            let is_known = (column.min..=column.max).contains(value);
+            let is_far = (f64::from(*value) - column.mean).abs() > CLIPPED_AT * column.deviation;
+            *count += usize::from(is_far && !is_known && column.deviation > 0.0);
+        }
+    }
+    let often = |count: &usize| *count as f64 > MOST_CLIPPED * values as f64;
+    let names: Vec<String> = beyond
+        .iter()
+        .enumerate()
+        .filter(|(_, count)| often(count))
+        .map(|(number, _)| evidence.value_name(number))
+        .collect();
+    if names.is_empty() || values < FEWEST_ROWS {
+        return Vec::new();
+    }
+    let most = beyond.iter().max().copied().unwrap_or_default() as f64 / values as f64;
+    let (sign, cause) = match evidence.is_normalised() && *seat == Seat::Policy {
+        true => (Sign::Saturated, "the normaliser knows the recordings, and clips what lies far outside of them"),
+        false => {
+            (Sign::OtherObservations, "the sensor has changed since the recording: its units, its order or its meaning")
+        }
+    };
+    vec![LearningFinding::new(
+        sign,
+        format!(
+            "{}: {} more than {CLIPPED_AT} deviations from the recorded mean, in up to {} of {} of {}",
+            list(&names),
+            if names.len() == 1 { "lies" } else { "lie" },
+            percent(most),
+            counted(values as u64, "tick"),
+            seat.name()
+        ),
+        cause,
+        &[Advice::RecordAgain, Advice::RaiseVersion],
+    )]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::testing::{evidence, played};
+
+    fn with_rows(row: impl Fn(usize) -> Vec<f32>) -> Evidence {
+        let mut evidence = evidence("ppo", "");
+        evidence.names = vec!["x".to_owned(), "speed".to_owned()];
+        evidence.played = vec![played(Seat::Random, 100, |tick| (row(tick), 0, 0.0))];
+        evidence
+    }
+
+    fn signs(evidence: &Evidence) -> Vec<Sign> {
+        check(evidence).into_iter().map(|finding| finding.sign).collect()
+    }
+
+    #[test]
+    fn values_that_vary_within_bounds_are_healthy() {
+        assert_eq!(signs(&with_rows(|tick| vec![tick as f32 / 100.0, 1.0 - tick as f32 / 50.0])), []);
+        assert_eq!(signs(&with_rows(|tick| vec![tick as f32 / 100.0, 3.0])), [], "one value may be constant");
+    }
+
+    #[test]
+    fn a_constant_observation_is_found_with_its_names() {
+        let found = check(&with_rows(|_| vec![0.0, 0.0]));
+        assert_eq!(found.len(), 1);
+        assert_eq!(found[0].sign, Sign::ConstantObservation);
+        assert!(found[0].evidence.contains("all 2 observed values are the same in all 100 ticks"), "{:?}", found[0]);
+        assert!(found[0].evidence.ends_with("`x`, `speed`"), "{:?}", found[0]);
+    }
+
+    #[test]
+    fn large_values_are_found_unless_they_are_normalised() {
+        let mut evidence = with_rows(|tick| vec![tick as f32 / 100.0, tick as f32 * 1000.0]);
+        let found = check(&evidence);
+        assert_eq!(found[0].sign, Sign::ObservationScale);
+        assert!(found[0].evidence.starts_with("`speed` (up to 99,000) beside values up to 0.99"), "{:?}", found[0]);
+        evidence.experiment.ppo.norm_obs = true;
+        assert_eq!(signs(&evidence), []);
+    }
+
+    #[test]
+    fn values_that_are_not_finite_are_named() {
+        let found = check(&with_rows(|tick| vec![tick as f32, if tick == 7 { f32::NAN } else { 1.0 + tick as f32 }]));
+        assert_eq!(found[0].sign, Sign::NotFinite);
+        assert_eq!(found[0].evidence, "`speed` is NaN or infinite");
+    }
+
+    #[test]
+    fn statistics_are_those_of_each_column() {
+        let rows = [[1.0, 5.0], [3.0, 5.0]];
+        let columns = statistics(rows.iter().map(<[f32; 2]>::as_slice));
+        assert_eq!((columns[0].min, columns[0].max, columns[0].mean, columns[0].deviation), (1.0, 3.0, 2.0, 1.0));
+        assert!(columns[1].is_constant() && !columns[0].is_constant());
+    }
+}

@@ -1,0 +1,292 @@
+//! Checks of reward and time: whether anybody is paid, for what, and whether it comes in time.
+
+use crate::diagnose::{
+    advice::Advice,
+    evidence::{Evidence, discount_and_norm},
+    finding::{LearningFinding, Sign},
+    play::{Played, PlayedEpisode, Seat, median},
+    recordings::replayed_episodes,
+};
+use bevy_playbot::episode::EpisodeEnd;
+use playbot_report::{percent, readable, whole};
+
+/// Largest size of a reward that a critic learns without a normaliser.
+const LARGEST_REWARD: f32 = 100.0;
+
+/// Share of the demonstrator's return that doing nothing must not reach.
+const MOST_FOR_NOTHING: f64 = 0.8;
+
+/// Share of episodes under which a reward is rare.
+const RARE: f64 = 0.01;
+
+/// Fewest episodes of the policy that say that it is rare.
+const FEWEST_EPISODES: f64 = 100.0;
+
+/// Present value of a reward under which it does not reach the start of an episode.
+const SMALLEST_VALUE: f64 = 1e-3;
+
+/// A horizon of fewer ticks is short where episodes are so many times as long.
+const SHORTEST_HORIZON: f64 = 10.0;
+const LONG_IN_HORIZONS: f64 = 5.0;
+
+/// Checks rewards, horizon and time limit.
+pub fn check(evidence: &Evidence) -> Vec<LearningFinding> {
+    let mut found = Vec::new();
+    found.extend(too_short(evidence));
+    found.extend(never(evidence));
+    found.extend(rare(evidence));
+    found.extend(idling(evidence));
+    found.extend(against(evidence));
+    found.extend(scale(evidence));
+    found.extend(horizon(evidence));
+    found
+}
+
+/// Says for each player what it gets.
+fn returns(evidence: &Evidence) -> String {
+    let words = evidence
+        .played
+        .iter()
+        .filter_map(|played| Some(format!("{} {}", played.seat.name(), readable(played.mean_return()?))));
+    words.collect::<Vec<_>>().join(", ")
+}
+
+fn pays(played: &Played) -> bool {
+    played.episodes.iter().any(|episode| episode.rewards.iter().any(|reward| *reward != 0.0))
+}
+
+/// Returns the ticks at which all ended episodes of a player are cut off; `None` if they end otherwise, or at other times.
+fn limit(played: &Played) -> Option<usize> {
+    let mut lengths = played.ended().map(|episode| (episode.end == Some(EpisodeEnd::Truncated), episode.ticks()));
+    let (is_cut, first) = lengths.next()?;
+    (is_cut && lengths.all(|(is_cut, ticks)| is_cut && ticks == first)).then_some(first)
+}
+
+/// Finds a time limit before which the goal cannot be reached: recorded wins take longer, or the demonstrator is always
+/// cut off before it.
+fn too_short(evidence: &Evidence) -> Option<LearningFinding> {
+    let demonstrator = evidence.played(Seat::Demonstrator)?;
+    let limit = limit(demonstrator).filter(|_| demonstrator.success() == Some(0.0))?;
+    let is_paid = demonstrator.ended().any(|episode| episode.first_reward().is_some());
+    if is_paid {
+        return None;
+    }
+    let recorded = evidence.recordings.iter().flat_map(|set| &set.episodes);
+    let wins = recorded.filter(|episode| episode.episode.is_success() || episode.first_reward().is_some());
+    let won = median(wins.map(|episode| episode.first_reward().unwrap_or(episode.episode.len())).collect());
+    let words = match won {
+        Some(ticks) if ticks > limit => format!("recorded wins take {} ticks", whole(ticks as f64)),
+        Some(_) => return None,
+        None => "it never gets there, nor does anybody else".to_owned(),
+    };
+    Some(LearningFinding::new(
+        Sign::ShortTime,
+        format!("every episode of the demonstrator is cut off after {} ticks, and {words}", whole(limit as f64)),
+        "the time limit is shorter than the path to the goal",
+        &[Advice::RaiseTimeLimit],
+    ))
+}
+
+fn never(evidence: &Evidence) -> Option<LearningFinding> {
+    let players: Vec<&Played> = evidence.played.iter().filter(|played| !played.episodes.is_empty()).collect();
+    let ticks: usize = players.iter().flat_map(|played| &played.episodes).map(PlayedEpisode::ticks).sum();
+    let trained = evidence.curves.as_ref().map(|curves| curves.curve(crate::metrics_log::EPISODIC_RETURN));
+    let was_paid = trained.is_some_and(|curve| curve.iter().any(|(_, value)| *value != 0.0));
+    if players.is_empty() || ticks == 0 || was_paid || players.iter().any(|played| pays(played)) {
+        return None;
+    }
+    let demonstrator = evidence.played(Seat::Demonstrator);
+    let wins = demonstrator.map_or(0, |played| played.ended().filter(|episode| episode.success).count());
+    let (words, cause, advice) = match demonstrator {
+        Some(_) if wins > 0 => (
+            format!("the demonstrator reaches the goal in {wins} episodes and is paid nothing"),
+            "the game ends the episode at the goal, and does not pay for it",
+            vec![Advice::PayReward],
+        ),
+        Some(_) => (
+            "the demonstrator is paid nothing either".to_owned(),
+            "the game never pays, or the goal cannot be reached",
+            vec![Advice::PayReward, Advice::MeasureBots],
+        ),
+        None => (
+            "there is no demonstrator to compare with".to_owned(),
+            "the game never pays, or chance never gets to the reward",
+            vec![Advice::PayReward, Advice::UseRecordings],
+        ),
+    };
+    Some(LearningFinding::new(
+        Sign::NoReward,
+        format!("no reward in {} ticks of {} players: {words}", whole(ticks as f64), players.len()),
+        cause,
+        &advice,
+    ))
+}
+
+fn rare(evidence: &Evidence) -> Option<LearningFinding> {
+    let curves = evidence.curves.as_ref()?;
+    let episodes = curves.last(crate::metrics_log::EPISODES).filter(|episodes| *episodes >= FEWEST_EPISODES)?;
+    let curve = curves.settled_or_all(crate::metrics_log::EPISODIC_RETURN);
+    let best = curve.iter().map(|(_, value)| *value).fold(f64::NEG_INFINITY, f64::max);
+    let demonstrator = evidence.played(Seat::Demonstrator)?;
+    let worth = demonstrator.mean_return().filter(|worth| *worth > 0.0)?;
+    (best.is_finite() && best < RARE * worth).then(|| {
+        LearningFinding::new(
+            Sign::RareReward,
+            format!(
+                "the best mean return of {} episodes is {}, under {} of the demonstrator's {}",
+                whole(episodes),
+                readable(best),
+                percent(RARE),
+                readable(worth)
+            ),
+            "the policy does not get to the reward by chance",
+            &[Advice::UseRecordings, Advice::TrainLonger, Advice::RaiseEntropy],
+        )
+    })
+}
+
+fn idling(evidence: &Evidence) -> Option<LearningFinding> {
+    let nothing = evidence.played(Seat::Idle)?.mean_return().filter(|earned| *earned > 0.0)?;
+    let demonstrator = evidence.played(Seat::Demonstrator).and_then(Played::mean_return);
+    let others = [Seat::Random, Seat::Chaos].into_iter().filter_map(|seat| evidence.played(seat)?.mean_return());
+    let worth = demonstrator.unwrap_or_else(|| others.fold(f64::NEG_INFINITY, f64::max));
+    let success = evidence.played(Seat::Idle).and_then(Played::success).unwrap_or_default();
+    (success < 0.5 && nothing >= MOST_FOR_NOTHING * worth).then(|| {
+        LearningFinding::new(
+            Sign::IdlingPays,
+            format!("returns: {}", returns(evidence)),
+            "the game pays for each tick, so an agent that waits earns as much as one that plays",
+            &[Advice::PayGoal, Advice::MeasureBots],
+        )
+    })
+}
+
+fn against(evidence: &Evidence) -> Option<LearningFinding> {
+    let demonstrator = evidence.played(Seat::Demonstrator)?;
+    let (worth, random) = (demonstrator.mean_return()?, evidence.played(Seat::Random)?.mean_return()?);
+    let wins = demonstrator.success().unwrap_or_default();
+    (wins > 0.0 && worth < random - 0.1 * random.abs().max(1e-6)).then(|| {
+        LearningFinding::new(
+            Sign::RewardAgainst,
+            format!("the demonstrator wins {} of its episodes; returns: {}", percent(wins), returns(evidence)),
+            "the reward has the wrong sign, or its penalties outweigh the goal",
+            &[Advice::PayGoal],
+        )
+    })
+}
+
+fn scale(evidence: &Evidence) -> Option<LearningFinding> {
+    let (_, is_normalised) = discount_and_norm(&evidence.experiment);
+    let rewards = evidence.played.iter().flat_map(|played| &played.episodes).flat_map(|episode| &episode.rewards);
+    let largest = rewards.fold(0.0_f32, |most, reward| most.max(reward.abs()));
+    (!is_normalised && largest > LARGEST_REWARD).then(|| {
+        LearningFinding::new(
+            Sign::RewardScale,
+            format!("a reward of {} in one tick; returns: {}", readable(f64::from(largest)), returns(evidence)),
+            "rewards far from 1 are not normalised, so the critic's loss drowns the policy's",
+            &[Advice::NormaliseRewards, Advice::ScaleInGame],
+        )
+    })
+}
+
+/// Compares the horizon with the time that the demonstrator takes to its first reward.
+fn horizon(evidence: &Evidence) -> Option<LearningFinding> {
+    let (gamma, _) = discount_and_norm(&evidence.experiment);
+    let live = evidence.played(Seat::Demonstrator).into_iter().flat_map(|played| &played.episodes);
+    let replayed = evidence.recordings.iter().flat_map(replayed_episodes);
+    let mut times: Vec<usize> = live.chain(replayed).filter_map(PlayedEpisode::first_reward).collect();
+    if times.is_empty() {
+        let recorded = evidence.recordings.iter().flat_map(|set| &set.episodes);
+        times = recorded.filter_map(|episode| episode.first_reward()).collect();
+    }
+    let ahead = 1.0 / (1.0 - gamma).max(1e-9);
+    let lengths = evidence.played.iter().flat_map(|played| &played.episodes).map(PlayedEpisode::ticks);
+    let (time, length) = (median(times), median(lengths.collect()));
+    let value = time.map(|time| libm::pow(gamma, time as f64));
+    let words = match (time.zip(value), length) {
+        (Some((time, value)), _) if value < SMALLEST_VALUE => format!(
+            "the demonstrator is rewarded after {} ticks, when γ = {gamma} leaves {} of the reward",
+            whole(time as f64),
+            readable(value)
+        ),
+        (_, Some(length)) if ahead < SHORTEST_HORIZON && length as f64 > LONG_IN_HORIZONS * ahead => format!(
+            "γ = {gamma} looks {} ticks ahead, and half of the played episodes have {} or more",
+            readable(ahead),
+            whole(length as f64)
+        ),
+        _ => return None,
+    };
+    Some(LearningFinding::new(
+        Sign::ShortHorizon,
+        words,
+        "the reward does not reach the actions that lead there",
+        &[Advice::LookAhead],
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::testing::{evidence, played};
+
+    fn player(seat: Seat, reward: f32, end: Option<EpisodeEnd>) -> Played {
+        let mut played = played(seat, 40, |tick| (vec![tick as f32], 0, if tick == 39 { reward } else { 0.0 }));
+        let success = end.is_some_and(EpisodeEnd::is_success);
+        (played.episodes[0].end, played.episodes[0].success) = (end, success);
+        played
+    }
+
+    fn signs(played: &[Played], settings: &str) -> Vec<Sign> {
+        let mut evidence = evidence("ppo", settings);
+        evidence.played = played.to_vec();
+        check(&evidence).into_iter().map(|finding| finding.sign).collect()
+    }
+
+    const CUT: Option<EpisodeEnd> = Some(EpisodeEnd::Truncated);
+    const WON: Option<EpisodeEnd> = Some(EpisodeEnd::WON);
+
+    #[test]
+    fn a_demonstrator_that_earns_more_than_the_rest_is_healthy() {
+        let players =
+            [player(Seat::Random, 0.0, CUT), player(Seat::Idle, 0.0, CUT), player(Seat::Demonstrator, 1.0, WON)];
+        assert_eq!(signs(&players, ""), []);
+    }
+
+    #[test]
+    fn a_game_that_never_pays_is_found() {
+        let players = [player(Seat::Random, 0.0, CUT), player(Seat::Demonstrator, 0.0, WON)];
+        assert_eq!(signs(&players, ""), [Sign::NoReward]);
+        assert_eq!(signs(&[player(Seat::Random, 0.0, CUT)], ""), [Sign::NoReward]);
+    }
+
+    #[test]
+    fn a_demonstrator_that_is_always_cut_off_has_too_little_time() {
+        let players = [player(Seat::Random, 0.0, CUT), player(Seat::Demonstrator, 0.0, CUT)];
+        assert_eq!(signs(&players, "")[0], Sign::ShortTime);
+    }
+
+    #[test]
+    fn pay_for_nothing_and_pay_against_the_goal_are_found() {
+        let players =
+            [player(Seat::Random, 0.1, CUT), player(Seat::Idle, 1.0, CUT), player(Seat::Demonstrator, 1.0, WON)];
+        assert_eq!(signs(&players, ""), [Sign::IdlingPays]);
+        let players = [player(Seat::Random, 0.0, CUT), player(Seat::Demonstrator, -1.0, WON)];
+        assert_eq!(signs(&players, ""), [Sign::RewardAgainst]);
+    }
+
+    #[test]
+    fn large_rewards_count_without_a_normaliser() {
+        let players = [player(Seat::Random, 0.0, CUT), player(Seat::Demonstrator, 1000.0, WON)];
+        assert_eq!(signs(&players, "ppo: (norm_reward: false)"), [Sign::RewardScale]);
+        assert_eq!(signs(&players, ""), []);
+    }
+
+    #[test]
+    fn a_reward_beyond_the_horizon_is_found() {
+        let players = [player(Seat::Random, 0.0, CUT), player(Seat::Demonstrator, 1.0, WON)];
+        assert_eq!(signs(&players, "ppo: (gamma: 0.8)"), [Sign::ShortHorizon], "0.8^40 is 1.3e-4");
+        assert_eq!(signs(&players, "ppo: (gamma: 0.9)"), [], "0.9^40 is 0.015");
+        let unpaid = [player(Seat::Random, 0.5, CUT)];
+        assert_eq!(signs(&unpaid, "ppo: (gamma: 0.8)"), [Sign::ShortHorizon], "40 ticks are eight horizons");
+    }
+}
