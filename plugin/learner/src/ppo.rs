@@ -53,8 +53,8 @@ use serde::{Deserialize, Serialize};
 use std::{cell::Cell, path::Path, time::Instant};
 
 pub use crate::ppo::{
-    config::PpoConfig,
-    curiosity::{Curiosity, Predictor, RndNet, combined_advantages, endless_gae, prediction_errors},
+    config::{Curiosity, PpoConfig},
+    curiosity::{Predictor, RndNet, combined_advantages, endless_gae, prediction_errors},
     imitation::{ImitationConfig, LabelledSteps},
     metrics::{RatioStats, StepMetrics, UpdateMetrics, explained_variance, ratio_stats},
     objective::{Advantages, PpoBatch, PpoLoss, gae, intrinsic_value_loss, normalize_advantages, ppo_loss},

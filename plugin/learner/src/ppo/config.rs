@@ -1,15 +1,20 @@
 //! Settings of PPO.
+//!
+//! - `curiosity`: those of a reward for what is new.
+
+mod curiosity;
 
 use crate::{
     Augmentation, LearnError, ObsKind, SettingError, TimeLimit,
     nn::CnnKind,
     norm::{RewardNormalizer, RewardReset},
     policy::MemoryKind,
-    ppo::curiosity::Curiosity,
     settings,
     settings::{Range, Reader, Settings},
 };
 use playbot_kernels::elementwise::Activation;
+
+pub use crate::ppo::config::curiosity::Curiosity;
 
 /// The algorithms that learn by PPO.
 const PPO: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO, Reader::SPIRL_PPO, Reader::SPIRL_SAC_DECODER];

@@ -8,18 +8,16 @@
 //!
 //! The folder, in reading order:
 //!
-//! - `config`: the settings.
 //! - `networks`: target and predictor.
 //! - `arrivals`: the observation to which each step led.
 //! - `returns`: the formulas: endless advantages, and their sum with those of the game.
 
 mod arrivals;
-mod config;
 mod networks;
 mod returns;
 
 use crate::{
-    FileError, LearnError, Observations, Rollout,
+    FileError, LearnError, ObsKind, Observations, Rollout,
     device::guarded,
     file::TensorFile,
     learner::LearnerBase,
@@ -29,13 +27,19 @@ use crate::{
     },
     norm::{ObsNormalizer, ObsStats, RewardNormalizer, put_stats, take_stats},
     policy::{Critic, Policy},
-    ppo::{PpoConfig, batch::minibatches, curiosity::arrivals::Arrivals},
+    ppo::{
+        Curiosity, PpoConfig,
+        batch::minibatches,
+        curiosity::{
+            arrivals::Arrivals,
+            networks::{RndShape, RndShapes},
+        },
+    },
 };
 use burn::tensor::{Device, Tensor};
 use playbot_kernels::host_numbers::is_host;
 
 pub use crate::ppo::curiosity::{
-    config::Curiosity,
     networks::{Predictor, RndNet, prediction_errors},
     returns::{combined_advantages, endless_gae},
 };
@@ -82,10 +86,9 @@ impl Rnd {
     /// # Errors
     /// [`LearnError::Config`] if images are too small for the convolutions.
     pub(super) fn fresh(config: &PpoConfig, base: &LearnerBase) -> Result<Option<Self>, LearnError> {
-        let Some(shapes) = config.curiosity.shapes(config, base.spec.obs) else { return Ok(None) };
+        let Some(shapes) = shapes(config, base.spec.obs) else { return Ok(None) };
         let device = base.device.plain();
-        let net =
-            |shape: &networks::RndShape, name: &str| guarded(&device, || shape.fresh(&base.streams, name, &device));
+        let net = |shape: &RndShape, name: &str| guarded(&device, || shape.fresh(&base.streams, name, &device));
         let (target, predictor) = (net(&shapes.target, TARGET)?, net(&shapes.predictor, "curiosity.predictor")?);
         Ok(Some(Self::with_nets(config, base, target, Predictor(predictor))))
     }
@@ -100,7 +103,7 @@ impl Rnd {
         file: &mut TensorFile,
         steps: u64,
     ) -> Result<Option<Self>, FileError> {
-        let Some(shapes) = config.curiosity.shapes(config, base.spec.obs) else { return Ok(None) };
+        let Some(shapes) = shapes(config, base.spec.obs) else { return Ok(None) };
         let device = base.device.plain();
         let target = shapes.target.stored(file, TARGET, &device)?;
         let predictor = Predictor(shapes.predictor.stored(file, "curiosity.predictor", &device)?);
@@ -259,6 +262,19 @@ impl Rnd {
     fn at_a_time(&self) -> Option<usize> {
         self.target.cnn.as_ref().map(ImageNet::images_at_a_time)
     }
+}
+
+/// Returns the sizes of target and predictor, which has the hidden layers twice; `None` without curiosity.
+fn shapes(config: &PpoConfig, obs: ObsKind) -> Option<RndShapes> {
+    let Curiosity::Rnd { hidden, features, .. } = &config.curiosity else { return None };
+    let shape = |hidden: Vec<usize>| RndShape {
+        obs,
+        cnn: config.cnn.clone(),
+        hidden,
+        features: *features,
+        activation: config.activation,
+    };
+    Some(RndShapes { target: shape(hidden.clone()), predictor: shape([&hidden[..], hidden].concat()) })
 }
 
 /// Returns the critic's second head out of `source`; `None` without curiosity. Its starting weights are orthogonal.

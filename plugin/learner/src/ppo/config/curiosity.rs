@@ -1,11 +1,7 @@
-//! Settings of curiosity.
+//! Settings of curiosity, a reward for what is new.
 
 use crate::{
-    ObsKind, SettingError,
-    ppo::{
-        PpoConfig,
-        curiosity::networks::{RndShape, RndShapes},
-    },
+    SettingError,
     settings::{Number, Range},
 };
 use serde::{Deserialize, Serialize};
@@ -110,21 +106,8 @@ impl Curiosity {
         Ok(())
     }
 
-    /// Returns the sizes of target and predictor; `None` without them.
-    pub(super) fn shapes(&self, config: &PpoConfig, obs: ObsKind) -> Option<RndShapes> {
-        let Self::Rnd { hidden, features, .. } = self else { return None };
-        let shape = |hidden: Vec<usize>| RndShape {
-            obs,
-            cnn: config.cnn.clone(),
-            hidden,
-            features: *features,
-            activation: config.activation,
-        };
-        Some(RndShapes { target: shape(hidden.clone()), predictor: shape([&hidden[..], hidden].concat()) })
-    }
-
     /// Returns the weights of extrinsic and intrinsic advantages.
-    pub(super) fn weights(&self) -> (f64, f64) {
+    pub(in crate::ppo) fn weights(&self) -> (f64, f64) {
         match self {
             Self::Off => (1.0, 0.0),
             Self::Rnd { extrinsic, intrinsic, .. } => (*extrinsic, *intrinsic),
@@ -132,7 +115,7 @@ impl Curiosity {
     }
 
     /// Returns the discount of intrinsic rewards.
-    pub(super) fn gamma(&self) -> f64 {
+    pub(in crate::ppo) fn gamma(&self) -> f64 {
         match self {
             Self::Off => 0.0,
             Self::Rnd { gamma, .. } => *gamma,
@@ -140,7 +123,7 @@ impl Curiosity {
     }
 
     /// Returns the learning rate of the predictor.
-    pub(super) fn lr(&self) -> f64 {
+    pub(in crate::ppo) fn lr(&self) -> f64 {
         match self {
             Self::Off => 0.0,
             Self::Rnd { lr, .. } => *lr,
@@ -148,7 +131,7 @@ impl Curiosity {
     }
 
     /// Returns how many of `rows` train the predictor: their share, rounded up.
-    pub(super) fn share_of(&self, rows: usize) -> usize {
+    pub(in crate::ppo) fn share_of(&self, rows: usize) -> usize {
         match self {
             Self::Off => 0,
             Self::Rnd { share, .. } => ((rows as f64 * share).ceil() as usize).min(rows),
