@@ -346,7 +346,7 @@ pub(crate) fn transplant<M: Parameters + Clone>(
                 report.anew.push((layer.to_owned(), why.to_owned()));
                 // Outputs stand beside each other, and need one another in nothing.
                 if !is_output(layer) {
-                    stopped = Some("it is behind a layer that begins anew");
+                    stopped = stopped.or(Some("it is behind a layer that begins anew"));
                 }
             }
         }

@@ -29,6 +29,9 @@ settings! {
     rounds: u64 = 10, in Range::COUNT;
     /// Steps that are labelled in a round, over all arenas together; rounded up to whole ticks of all.
     steps: u64 = 10_000, in Range::COUNT;
+    /// Least ticks of an arena in a round: fewer arenas play if there are too few steps for all. Rounds begin with new
+    /// episodes, so this has to be longer than an episode: else its end is never seen.
+    ticks: u64 = 1000, in Range::COUNT;
     /// Share of the actions that the demonstrator takes in round n, from 0: this number to the power of n. With 1 it takes
     /// all of them in every round, which is imitation alone.
     beta: f64 = 0.5, in Range::SHARE;
