@@ -186,7 +186,8 @@ impl Ground {
     fn takes(&self, fault: &PlantedFault) -> bool {
         let needs_demos = fault.algorithms.contains(&"score-ppo") || fault.needs_demonstrator;
         let swaps = fault.rule == RuleFault::SwappedActions && self.is_discrete() && self.needed.len() < 2;
-        !(needs_demos && !self.has_demonstrator()) && !(fault.is_discrete && !self.is_discrete()) && !swaps
+        let has_all = self.has_demonstrator() || !needs_demos;
+        has_all && (self.is_discrete() || !fault.is_discrete) && !swaps
     }
 
     fn experiment(&self, algorithm: &str, demos: &Path, seed: u64) -> Result<Experiment, Failure> {

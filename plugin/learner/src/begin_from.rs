@@ -364,7 +364,7 @@ pub(crate) fn transplant<M: Parameters + Clone>(
                 // Outputs stand beside each other, and need one another in nothing. A new memory has no effect yet.
                 let is_new_memory = is_memory(layer) && fit.memory > 0;
                 if !is_output(layer) && !is_new_memory {
-                    stopped = Some("it is behind a layer that begins anew");
+                    stopped = stopped.or(Some("it is behind a layer that begins anew"));
                 }
             }
         }

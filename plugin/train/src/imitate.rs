@@ -419,7 +419,8 @@ impl<'a> Imitation<'a> {
 
     /// Plays a round, asks the demonstrator, and keeps its labels. Returns their number.
     fn label(&mut self, round: u64) -> Result<usize, ImitateError> {
-        let Experiment { imitation, seed, arenas, worlds, .. } = &self.experiment;
+        let Experiment { imitation, seed, worlds, .. } = &self.experiment;
+        let arenas = arenas_of(&self.experiment);
         let policy = self.learner.policy();
         let Asked { steps, episodes } = ask(&AskPlan {
             game: self.game,
@@ -429,9 +430,9 @@ impl<'a> Imitation<'a> {
             seed: seed_of(*seed, round),
             share: imitation.beta.powi(i32::try_from(round).unwrap_or(i32::MAX)),
             policy: &policy,
-            ticks: imitation.steps.div_ceil(u64::from(*arenas)),
-            arenas: *arenas,
-            worlds: *worlds,
+            ticks: imitation.steps.div_ceil(u64::from(arenas)),
+            arenas,
+            worlds: (*worlds).min(arenas),
             threads: self.threads,
         })?;
         self.save_labels(round, &steps)?;
@@ -496,9 +497,16 @@ fn seed_of(seed: u64, round: u64) -> u64 {
     (unit(&mut Streams::new(seed).stream("imitation.round", round)) * (1u64 << 53) as f64) as u64
 }
 
+/// Returns the arenas of a round: as many as play long enough, and a number that the Worlds share.
+fn arenas_of(experiment: &Experiment) -> u32 {
+    let Experiment { imitation, arenas, worlds, .. } = experiment;
+    let wanted = (imitation.steps / imitation.ticks.max(1)).clamp(1, u64::from(*arenas)) as u32;
+    if wanted < *worlds { wanted } else { wanted - wanted % (*worlds).max(1) }
+}
+
 /// Returns the steps of a round: whole ticks of all arenas.
 fn round_steps(experiment: &Experiment) -> u64 {
-    let (steps, arenas) = (experiment.imitation.steps, u64::from(experiment.arenas));
+    let (steps, arenas) = (experiment.imitation.steps, u64::from(arenas_of(experiment)));
     steps.checked_next_multiple_of(arenas).unwrap_or(steps)
 }
 

@@ -19,8 +19,6 @@ pub use crate::ppo::config::curiosity::Curiosity;
 /// The algorithms that learn by PPO.
 const PPO: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO, Reader::SPIRL_PPO, Reader::SPIRL_SAC_DECODER];
 
-/// Those of them that may be curious.
-const CURIOUS: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO];
 /// The algorithms whose networks its settings describe.
 const NETWORKS: &[Reader] =
     &[Reader::SCORE_PPO, Reader::PPO, Reader::SPIRL_PPO, Reader::SPIRL_SAC_DECODER, Reader::IMITATION];
@@ -28,8 +26,8 @@ const NETWORKS: &[Reader] =
 /// Those of them whose policy is over actions.
 const OVER_ACTIONS: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO, Reader::SPIRL_PPO_DECODER, Reader::SPIRL_SAC_DECODER];
 
-/// Those of them whose policy can remember.
-const REMEMBER: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO];
+/// Those of them whose policy chooses an action in each tick, which may remember and be curious.
+const IN_EACH_TICK: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO];
 
 settings! {
     /// Hyperparameters of PPO. The defaults are those of the paper's CoinRun runs, with 64 environments in mind.
@@ -80,7 +78,7 @@ settings! {
     norm_obs: bool = false, by NETWORKS;
     /// The memory of actor and critic. A policy that starts as a copy of the decoder has one that is without effect at
     /// first. `sequence` ticks are trained together, and `burn_in` is explained with them.
-    memory: MemoryKind = MemoryKind::None, in Range::COUNT, by REMEMBER, such as "Gru(hidden: 128)", off "settings::is_off";
+    memory: MemoryKind = MemoryKind::None, in Range::COUNT, by IN_EACH_TICK, such as "Gru(hidden: 128)", off "settings::is_off";
     /// Hidden layers of actor and critic. A copied decoder brings its own.
     hidden: Vec<usize> = vec![200, 200], in Range::COUNT, by NETWORKS;
     /// The function after each hidden layer.
@@ -111,7 +109,7 @@ settings! {
     /// samples train the predictor, with the rate `lr`. `hidden` and `features` are its sizes.
     curiosity: Curiosity = Curiosity::Off,
         within "`extrinsic`, `intrinsic` 0 to 1000000; `gamma` at least 0 and below 1; `share` above 0, at most 1; `lr` \
-        above 0; sizes at least 1", by CURIOUS,
+        above 0; sizes at least 1", by IN_EACH_TICK,
         such as "Rnd(extrinsic: 2.0, intrinsic: 1.0, gamma: 0.99, share: 0.25)", off "crate::settings::is_off";
 }
 

@@ -29,6 +29,9 @@ settings! {
     rounds: u64 = 10, in Range::COUNT;
     /// Steps that are labelled in a round, over all arenas together; rounded up to whole ticks of all.
     steps: u64 = 10_000, in Range::COUNT;
+    /// Least ticks of an arena in a round: fewer arenas play if there are too few steps for all. Rounds begin with new
+    /// episodes, so this has to be longer than an episode: else its end is never seen.
+    ticks: u64 = 1000, in Range::COUNT;
     /// Share of the actions that the demonstrator takes in round n, from 0: this number to the power of n. With 1 it takes
     /// all of them in every round, which is imitation alone.
     beta: f64 = 0.5, in Range::SHARE;
@@ -326,18 +329,20 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("learner.safetensors");
         let (steps, config) = (sides(100, true), ImitationConfig::default());
-        let mut learner = learner(ActionSpace::Discrete(3), true);
-        let values = |learner: &PpoLearner| learner.policy().forward(&[], &[0.0, 0.0], 1).expect("finite").values;
-        let before = values(&learner);
-        learner.imitate(&steps, 100, &config).expect("finite");
-        learner.save(&path).expect("written");
-        let mut loaded = PpoLearner::load(&path, DeviceKind::Flex).expect("readable");
-        let first = learner.imitate(&steps, 0, &config).expect("finite");
-        assert_eq!(loaded.imitate(&steps, 0, &config).expect("finite"), first);
         let play = |learner: &PpoLearner| learner.policy().forward(&[], &[0.3, -0.2], 1).expect("finite");
-        assert_eq!(play(&loaded), play(&learner));
-        // Its input is normalised by other statistics, and its weights are the same.
-        assert!(before.iter().chain(&values(&learner)).all(|value| value.is_finite()));
+        for norm_obs in [false, true] {
+            let mut learner = learner(ActionSpace::Discrete(3), norm_obs);
+            let before = play(&learner);
+            learner.imitate(&steps, 100, &config).expect("finite");
+            learner.save(&path).expect("written");
+            let mut loaded = PpoLearner::load(&path, DeviceKind::Flex).expect("readable");
+            let next = learner.imitate(&steps, 0, &config).expect("finite");
+            assert_eq!(loaded.imitate(&steps, 0, &config).expect("finite"), next);
+            assert_eq!(play(&loaded), play(&learner));
+            assert_ne!(play(&learner).head, before.head);
+            // With a normaliser its weights stay, but its input changes.
+            assert_eq!(play(&learner).values == before.values, !norm_obs);
+        }
     }
 
     #[test]

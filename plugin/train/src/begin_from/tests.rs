@@ -10,6 +10,7 @@ use crate::{
 use bevy::prelude::*;
 use bevy_playbot::prelude::*;
 use playbot_harness::foreign::{ForeignGame, LevelSeed};
+use playbot_learner::{Actions, Dataset, DatasetEpisode, SkillTrainer};
 
 struct Quiet;
 
@@ -122,6 +123,58 @@ fn ancestry_is_kept_over_generations() {
     assert_eq!(ancestor.checksum, file_checksum(&file).ok());
     let seen = info.seen.expect("known");
     assert_eq!(seen.levels, ["default:0..9"]);
+}
+
+/// Returns a skill model of made-up recordings, whose values are called `place` and `side`.
+fn skills(experiment: &Experiment) -> SkillModel {
+    let episode = |number: u16| DatasetEpisode {
+        observations: (0..24).map(|at| f32::from((at * 5 + number) % 7) / 7.0).collect::<Vec<f32>>().into(),
+        actions: Actions::Discrete((0..12).map(|at| u32::from((at + number) % 2)).collect()),
+    };
+    let episodes = (0..4).map(episode).collect();
+    let dataset = Dataset::new(2, ActionSpace::Discrete(2), episodes).expect("good episodes");
+    let mut trainer = SkillTrainer::new(experiment.skills.clone(), dataset, 1, DeviceKind::Flex).expect("windows fit");
+    trainer.train_batch().expect("finite");
+    trainer.into_model()
+}
+
+#[test]
+fn skills_come_with_the_run_that_was_trained_on_them() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let with = |algorithm| {
+        let skills = r#"demos: "d", score: (horizon: 3), skills: (window: 3, epochs: 2, batch: 16, hidden: [4],
+            encoder_hidden: 4, gru_hidden: 4, latent: 2)"#;
+        let experiment = experiment(skills);
+        let ppo = playbot_learner::PpoConfig { norm_obs: false, ..experiment.ppo.clone() };
+        Experiment { algorithm, ppo, ..experiment }
+    };
+    let (path, settings) = (folder.path().join("old"), with(Algorithm::ScorePpo));
+    let (narrow, model) = (line(&["place", "side"]), skills(&settings));
+    let new =
+        NewRun { path: &path, experiment: &settings, skills: Some(&model), skill_file: None, from: None, force: false };
+    let mut old = Training::begin(&narrow, &new, &setup(), &mut Quiet).expect("it fits");
+    assert!(old.drive(&mut Quiet).expect("it trains"));
+
+    let wide = line(&["extra", "place", "side", "more"]);
+    let from = Some(BeginFrom::new(&path));
+    let child = begin(&wide, &settings, &folder.path().join("child"), from).expect("it brings its skills");
+    let started = child.started.as_ref().expect("it has just begun");
+    let report = started.report.as_ref().expect("a policy");
+    assert!(started.has_skills && report.is_same_policy && report.new_inputs == 2, "{report}");
+    let (z, short, long) = ([0.3, -0.6], [0.25, -1.0], [7.0, 0.25, -1.0, -3.5]);
+    let play = |training: &Training, obs: &[f32]| training.trainer.policy().forward(&z, obs, 1).expect("finite");
+    assert_eq!(play(&child, &long), play(&old, &short));
+
+    let over_skills =
+        begin(&wide, &with(Algorithm::SpirlPpo), &folder.path().join("spirl"), from).expect("skills alone");
+    let started = over_skills.started.expect("it has just begun");
+    assert!(started.has_skills && started.report.is_none());
+    let run = folder.path().join("twice");
+    let new = NewRun { path: &run, experiment: &with(Algorithm::SpirlPpo), from, ..new };
+    let error = Training::begin(&narrow, &new, &setup(), &mut Quiet).err().expect("nothing is left to take");
+    assert!(error.to_string().contains("takes its skills only: leave --skills out"), "{error}");
+    let error = begin(&narrow, &experiment(""), &run, from).err().expect("its policy reads skills").to_string();
+    assert!(error.contains("whose policy reads skills") && error.contains("add --algorithm score-ppo"), "{error}");
 }
 
 #[test]

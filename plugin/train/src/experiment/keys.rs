@@ -76,7 +76,13 @@ fn neighbour(section: &str, name: &str) -> Option<String> {
     if let Some(longer) = paths().find(longer) {
         return Some(longer.to_owned());
     }
-    if let Some(elsewhere) = elsewhere().find(of_near_section).or_else(|| elsewhere().next()) {
+    // Else the first of those whose section has most letters of the wrong one.
+    let letters = |path: &str| {
+        let own = path.split('.').next().unwrap_or_default();
+        section.chars().filter(|letter| own.contains(*letter)).count()
+    };
+    let likeliest = || elsewhere().reduce(|one, other| if letters(other) > letters(one) { other } else { one });
+    if let Some(elsewhere) = elsewhere().find(of_near_section).or_else(likeliest) {
         return Some(elsewhere.to_owned());
     }
     let mut here = names(section);

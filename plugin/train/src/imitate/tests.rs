@@ -59,7 +59,7 @@ fn experiment(changes: &str) -> Experiment {
     let text = format!(
         r#"(game: "line", train: "default:0..19", test: "default:100..109", steps: 1, arenas: 6, worlds: 3,
         ppo: (hidden: [8], norm_obs: true),
-        imitation: (dagger: true, rounds: 4, steps: 60, lr: 0.01, batch: 16, patience: 9, {changes}))"#
+        imitation: (dagger: true, rounds: 4, steps: 60, ticks: 10, lr: 0.01, batch: 16, patience: 9, {changes}))"#
     );
     parse_experiment(&text, Path::new("x.ron")).expect("valid")
 }
@@ -209,6 +209,20 @@ fn the_last_training_levels_say_which_round_is_the_best() {
     assert_eq!(levels("0..99", "held_out: 0.0"), pair("a:0..99", ""));
     assert_eq!(levels("0..0", "held_out: 1.0"), pair("a:0..0", ""), "there is only one");
     assert_eq!(levels("0..1", "held_out: 1.0"), pair("a:0..0", "a:1..1"));
+}
+
+#[test]
+fn as_many_arenas_play_as_see_whole_episodes() {
+    let of = |arenas, ticks| {
+        let imitation = playbot_learner::ImitationConfig { ticks, ..experiment("").imitation };
+        let experiment = Experiment { arenas, imitation, ..experiment("") };
+        (arenas_of(&experiment), round_steps(&experiment))
+    };
+    assert_eq!(of(6, 10), (6, 60));
+    assert_eq!(of(3, 10), (3, 60), "each plays longer");
+    assert_eq!(of(12, 12), (3, 60), "three Worlds share them");
+    assert_eq!(of(12, 25), (2, 60), "there are more Worlds than arenas");
+    assert_eq!(of(12, 1000), (1, 60));
 }
 
 #[test]
