@@ -15,7 +15,6 @@ mod lander;
 mod leaps;
 mod lessons;
 mod level_detectors;
-mod level_detectors;
 mod memories;
 mod one_world;
 mod orders;
