@@ -113,7 +113,9 @@ fn steps_of_policy(experiment: &Experiment, tag: &Tag<'_>, succeeds: bool, is_so
             readable(kl),
             readable(clip)
         );
-        if kl.abs() < SMALLEST_KL && clip == 0.0 && !is_solved {
+        // Steps that are too large can leave nothing that moves, and are reported already.
+        let can_move = ppo.lr < HIGHEST_RATE;
+        if kl.abs() < SMALLEST_KL && clip == 0.0 && !is_solved && can_move {
             let (cause, advice) = match () {
                 () if ppo.lr < 1e-5 => (format!("`ppo.lr` is {}", readable(ppo.lr)), vec![Advice::RaiseRate]),
                 () if ppo.max_grad_norm < 1e-3 => {
@@ -313,6 +315,8 @@ mod tests {
         let ppo = experiment("ppo", "");
         let still = [("losses/approx_kl", 0.0), ("losses/clip_fraction", 0.0)];
         assert_eq!(signs(&ppo, &still), [Sign::Unmoved]);
+        let dead = experiment("ppo", "ppo: (lr: 1.0)");
+        assert_eq!(signs(&dead, &still), [Sign::LearningRate], "no advice to raise it");
         let solved = [("losses/approx_kl", 0.0), ("losses/clip_fraction", 0.0), (SUCCESS_RATE, 0.99)];
         assert_eq!(signs(&ppo, &solved), [], "it has nothing to learn");
         assert_eq!(signs(&ppo, &[("losses/approx_kl", 2.0)]), [Sign::MovesTooFar]);
