@@ -110,7 +110,13 @@ fn gather(args: &Args, games: &Games) -> Result<Evidence, CliError> {
         let (game, from) = of_demos(args, games)?;
         let experiment = from.load(games, [])?;
         let skills = skills(args)?;
-        return of_recordings(game, &experiment, &args.demo, skills.as_ref(), &gathering).map_err(explain);
+        let mut evidence =
+            of_recordings(game, &experiment, &args.demo, skills.as_ref(), &gathering).map_err(explain)?;
+        if !args.from.names_game() {
+            // They are compared with levels that somebody has named, and not with a default.
+            evidence.other_modes.clear();
+        }
+        return Ok(evidence);
     }
     if !args.from.names_game() {
         return Err(CliError::Usage(

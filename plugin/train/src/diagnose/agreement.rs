@@ -50,6 +50,8 @@ pub struct Agreement {
     pub equal: usize,
     /// Share of these whose actions differ.
     pub differing: f64,
+    /// Agreement of an action with the one before it beyond chance: demonstrators keep on doing what they do.
+    pub persistence: f64,
 }
 
 /// Share of actions that the full state predicts beyond the observation, from which on it decides.
@@ -102,12 +104,16 @@ pub fn agreement(episodes: &[(Vec<&[f32]>, Vec<ActionValue>)]) -> Option<Agreeme
     }
     let chance = chance(&steps.iter().map(|(_, _, action)| *action).collect::<Vec<_>>());
     let agreed = agreed / pairs.max(1) as f64;
-    let beyond_chance = match steps.first() {
-        Some((_, _, ActionValue::Continuous(_))) => 1.0 - agreed / chance.max(1e-12),
-        _ => (agreed - chance) / (1.0 - chance).max(1e-12),
+    let is_continuous = matches!(steps.first(), Some((_, _, ActionValue::Continuous(_))));
+    let beyond = |agreed: f64| match is_continuous {
+        true => 1.0 - agreed / chance.max(1e-12),
+        false => (agreed - chance) / (1.0 - chance).max(1e-12),
     };
+    let beyond_chance = beyond(agreed);
+    let following = episodes.iter().flat_map(|(_, actions)| actions.windows(2));
+    let persistence = beyond(mean(following.map(|pair| likeness(&pair[0], &pair[1]))).unwrap_or(chance));
     let differing = differing as f64 / equal.max(1) as f64;
-    (pairs >= FEWEST).then_some(Agreement { pairs, beyond_chance, chance, equal, differing })
+    (pairs >= FEWEST).then_some(Agreement { pairs, beyond_chance, chance, equal, differing, persistence })
 }
 
 /// Returns 1 for equal discrete actions and 0 for others, or the squared distance of continuous ones.
@@ -192,7 +198,8 @@ pub fn check(evidence: &Evidence) -> Vec<LearningFinding> {
     let noise = set.episodes.iter().map(|episode| episode.noise).fold(0.0, f64::max);
     let is_discrete = seen.iter().any(|(_, actions)| matches!(actions.first(), Some(ActionValue::Discrete(_))));
     let is_one = is_discrete && found.chance > 0.95 || !is_discrete && found.chance < 1e-6;
-    if !is_one && found.beyond_chance < NO_AGREEMENT {
+    // Neighbours among hundreds of values say little, but random actions do not last either.
+    if !is_one && found.beyond_chance < NO_AGREEMENT && found.persistence < NO_AGREEMENT {
         let cause = match is_discrete && noise > 0.5 {
             true => format!("{} of the recorded actions are random", percent(noise)),
             false => "the demonstrator acts at random, or by something that agents do not observe".to_owned(),
@@ -262,6 +269,8 @@ mod tests {
     fn actions_that_follow_from_observations_agree() {
         let found = measured(|seen, _| u32::from(seen > 9));
         assert!(found.beyond_chance > 0.99 && found.differing == 0.0, "{found:?}");
+        let lasting = measured(|_, step| u32::from(step % 500 > 250));
+        assert!(lasting.persistence > 0.5, "an action lasts for some steps: {lasting:?}");
         assert_eq!(found.equal, found.pairs, "every observation comes back");
     }
 

@@ -12,6 +12,9 @@ use playbot_report::{counted, percent};
 /// Share of ticks without an action from which on a recording shows nothing.
 const MOST_IDLE: f64 = 0.9;
 
+/// Success rate below which recordings of other levels may be the cause.
+const RARELY: f64 = 0.3;
+
 /// Checks what recordings are of and what they show.
 pub fn check(evidence: &Evidence) -> Vec<LearningFinding> {
     let Some(set) = evidence.recordings.as_ref().filter(|set| !set.episodes.is_empty()) else { return Vec::new() };
@@ -84,7 +87,9 @@ fn idle(set: &RecordedSet) -> Option<LearningFinding> {
 }
 
 fn other_levels(evidence: &Evidence, set: &RecordedSet) -> Option<LearningFinding> {
-    if evidence.other_modes.is_empty() {
+    // Skills of an easier mode may well serve a harder one: what counts is that the policy does not get there.
+    let fails = evidence.success().is_some_and(|success| success < RARELY);
+    if evidence.other_modes.is_empty() || !fails {
         return None;
     }
     let of_others =
@@ -130,6 +135,7 @@ mod tests {
         play::Replayed,
         testing::{evidence, recorded},
     };
+    use crate::{metrics_log::SUCCESS_RATE, runs::RunCurves};
 
     fn signs(evidence: &Evidence) -> Vec<Sign> {
         check(evidence).into_iter().map(|finding| finding.sign).collect()
@@ -153,6 +159,10 @@ mod tests {
         assert_eq!(signs(&with(recorded(0, true))), [Sign::IdleRecordings], "action 0 does nothing");
         let mut elsewhere = with(recorded(1, true));
         elsewhere.other_modes = vec!["hard".to_owned()];
+        assert_eq!(signs(&elsewhere), [], "it is not known to fail");
+        let mut curves = RunCurves::default();
+        curves.push(100, [(SUCCESS_RATE, 0.1)].into_iter());
+        elsewhere.curves = Some(curves);
         assert_eq!(signs(&elsewhere), [Sign::OtherLevels]);
     }
 

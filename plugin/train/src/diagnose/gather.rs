@@ -333,7 +333,8 @@ fn examine_game(evidence: &mut Evidence, game: &dyn Game) {
                 format!("{}{value}", comparison.comparison.describe())
             });
             let words = words.collect::<Vec<_>>().join("; ");
-            evidence.doctor = Some(if words.is_empty() { "the doctor found a difference".to_owned() } else { words });
+            // It also finds observations that never change, which players show with their names.
+            evidence.doctor = Some(words).filter(|words| !words.is_empty());
         }
         Err(fault) => evidence.faults.push(fault.to_string()),
     }

@@ -17,9 +17,11 @@ const RECENT: usize = 5;
 
 /// Learning rates beyond which networks of this size keep nothing: a hundred times the default.
 const HIGHEST_RATE: f64 = 0.02;
+/// Learning rates and gradients under which nothing is learned in any number of steps.
+const LOWEST_RATE: f64 = 1e-7;
 /// Bounds of a mean KL divergence and clip share in an update. Schulman et al. (2017) aim at 0.003 to 0.03.
 const LARGEST_KL: f64 = 0.5;
-const LARGEST_CLIP_SHARE: f64 = 0.8;
+const LARGEST_CLIP_SHARE: f64 = 0.6;
 const SMALLEST_KL: f64 = 1e-6;
 /// An entropy bonus of this weight outweighs advantages that are normalised to a deviation of 1.
 const LARGEST_ENTROPY_WEIGHT: f64 = 0.5;
@@ -46,7 +48,7 @@ pub fn check(experiment: &Experiment, curves: &RunCurves) -> Vec<LearningFinding
     let is_solved = success.is_some_and(|rate| rate >= 0.9);
     let mut found = settings(experiment, &tag);
     if experiment.algorithm.learner() == LearnerKind::Ppo {
-        found.extend(steps_of_policy(experiment, &tag, succeeds, is_solved));
+        found.extend(steps_of_policy(experiment, &tag, is_solved));
         found.extend(critic(experiment, &tag, succeeds));
         found.extend(collapse(experiment, &tag, succeeds));
     }
@@ -100,7 +102,7 @@ fn settings(experiment: &Experiment, tag: &Tag<'_>) -> Vec<LearningFinding> {
     found
 }
 
-fn steps_of_policy(experiment: &Experiment, tag: &Tag<'_>, succeeds: bool, is_solved: bool) -> Vec<LearningFinding> {
+fn steps_of_policy(experiment: &Experiment, tag: &Tag<'_>, is_solved: bool) -> Vec<LearningFinding> {
     let ppo = &experiment.ppo;
     let mut found = Vec::new();
     let learned = tag("approx_kl").len() as u64;
@@ -113,7 +115,11 @@ fn steps_of_policy(experiment: &Experiment, tag: &Tag<'_>, succeeds: bool, is_so
             readable(kl),
             readable(clip)
         );
-        if kl.abs() < SMALLEST_KL && clip == 0.0 && !is_solved {
+        // Steps that are too large can leave nothing that moves, and are reported already.
+        let can_move = ppo.lr < HIGHEST_RATE;
+        // A decoder may solve the task without a policy that learns.
+        let is_held = ppo.lr < LOWEST_RATE || ppo.max_grad_norm < LOWEST_RATE;
+        if kl.abs() < SMALLEST_KL && clip == 0.0 && (!is_solved || is_held) && can_move {
             let (cause, advice) = match () {
                 () if ppo.lr < 1e-5 => (format!("`ppo.lr` is {}", readable(ppo.lr)), vec![Advice::RaiseRate]),
                 () if ppo.max_grad_norm < 1e-3 => {
@@ -130,7 +136,7 @@ fn steps_of_policy(experiment: &Experiment, tag: &Tag<'_>, succeeds: bool, is_so
                 }
             };
             found.push(LearningFinding::new(Sign::Unmoved, evidence, cause, &advice));
-        } else if !succeeds && (kl > LARGEST_KL || clip > LARGEST_CLIP_SHARE) {
+        } else if !is_solved && (kl > LARGEST_KL || clip > LARGEST_CLIP_SHARE) {
             let cause = format!("`ppo.lr` = {} or `ppo.epochs` = {} is too much", readable(ppo.lr), ppo.epochs);
             found.push(LearningFinding::new(
                 Sign::MovesTooFar,
@@ -313,6 +319,8 @@ mod tests {
         let ppo = experiment("ppo", "");
         let still = [("losses/approx_kl", 0.0), ("losses/clip_fraction", 0.0)];
         assert_eq!(signs(&ppo, &still), [Sign::Unmoved]);
+        let dead = experiment("ppo", "ppo: (lr: 1.0)");
+        assert_eq!(signs(&dead, &still), [Sign::LearningRate], "no advice to raise it");
         let solved = [("losses/approx_kl", 0.0), ("losses/clip_fraction", 0.0), (SUCCESS_RATE, 0.99)];
         assert_eq!(signs(&ppo, &solved), [], "it has nothing to learn");
         assert_eq!(signs(&ppo, &[("losses/approx_kl", 2.0)]), [Sign::MovesTooFar]);

@@ -12,6 +12,9 @@ use playbot_report::{counted, percent, readable, whole};
 /// Sizes of values that networks learn from without a normaliser. Constant values of another size do no harm.
 const FIT: std::ops::RangeInclusive<f32> = 1e-3..=100.0;
 
+/// Share of the values that may be smaller.
+const MOST_TINY: f64 = 0.25;
+
 /// Deviations from the mean at which normalisers clip.
 const CLIPPED_AT: f64 = 10.0;
 
@@ -172,8 +175,14 @@ fn scales(evidence: &Evidence, columns: &[ColumnStatistics]) -> Option<LearningF
     if evidence.is_normalised() || evidence.names.is_empty() {
         return None;
     }
-    let is_strange =
-        |column: &ColumnStatistics| !column.is_constant() && column.size() > 0.0 && !FIT.contains(&column.size());
+    let varied = columns.iter().filter(|column| !column.is_constant() && column.size() > 0.0);
+    let tiny = varied.clone().filter(|column| column.size() < *FIT.start()).count();
+    // A few values that are rarely more than 0 do no harm.
+    let are_many_tiny = tiny as f64 > MOST_TINY * varied.count() as f64;
+    let is_strange = |column: &ColumnStatistics| {
+        let is_tiny = column.size() > 0.0 && column.size() < *FIT.start();
+        !column.is_constant() && (column.size() > *FIT.end() || is_tiny && are_many_tiny)
+    };
     let strange: Vec<String> = columns
         .iter()
         .enumerate()
@@ -284,6 +293,10 @@ mod tests {
         assert!(found[0].evidence.starts_with("`speed` (up to 99,000) beside values up to 0.99"), "{:?}", found[0]);
         evidence.experiment.ppo.norm_obs = true;
         assert_eq!(signs(&evidence), []);
+        let tiny = |tick: usize| tick as f32 * 1e-6;
+        assert_eq!(signs(&with_rows(|tick| vec![tiny(tick), tiny(tick)])), [Sign::ObservationScale]);
+        let wide = |tick: usize| vec![tick as f32, tick as f32, tick as f32, tiny(tick)];
+        assert_eq!(signs(&with_rows(wide)), [], "one of four may be tiny");
     }
 
     #[test]
