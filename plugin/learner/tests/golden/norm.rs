@@ -35,7 +35,8 @@ fn golden_norm_obs() {
     let case = Case::load("norm_obs");
     case.assert_fixed("order", "update the statistics, then normalise");
     let dim = case.dim("D");
-    let mut normalizer = ObsNormalizer { stats: fresh(&case, dim) };
+    let mut normalizer = ObsNormalizer::new(dim);
+    normalizer.stats = fresh(&case, dim);
     for i in 0..case.dim("batches") {
         let batch = case.f32s(&format!("in.batch{i}"));
         normalizer.update(&batch);
