@@ -202,7 +202,8 @@ mod tests {
 
     fn output(head: Vec<f32>) -> PolicyOutput {
         let values = vec![0.0; head.len() / 2];
-        PolicyOutput { space: ActionSpace::Discrete(2), squashed: false, head, log_std: Vec::new(), values }
+        let (space, log_std, memory) = (ActionSpace::Discrete(2), Vec::new(), Vec::new());
+        PolicyOutput { space, squashed: false, head, log_std, values, memory }
     }
 
     #[test]
