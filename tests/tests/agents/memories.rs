@@ -53,14 +53,14 @@ fn memories_begin_with_the_episode_and_follow_the_observations() {
     let mut ended = 0;
     for rollout in [&first, &second] {
         let done = rollout.done();
-        for at in 0..AGENTS * TICKS {
+        for (at, &is_done) in done.iter().enumerate() {
             let agent = at % AGENTS;
             let before = if begun[agent] { &[0.0; WIDTH][..] } else { &after[agent] };
             assert_eq!(memory(&rollout.memory, at), before, "row {at}");
             let output = policy.forward_remembering(&[], &[], before, &seen(&rollout.obs, at), 1).expect("fits");
             assert_eq!(rollout.values[at], output.values[0], "row {at}: the value of what is remembered");
-            (after[agent], begun[agent]) = (output.memory, done[at]);
-            ended += usize::from(done[at]);
+            (after[agent], begun[agent]) = (output.memory, is_done);
+            ended += usize::from(is_done);
         }
         ends_are_valued_with_what_is_remembered(&policy, rollout, &after, &begun);
     }
