@@ -1,7 +1,7 @@
 //! Tables, in HTML and as text for the console.
 
 use crate::{
-    escape::{escape, one_line},
+    escape::{escape, one_line, with_code_spans},
     number::{UNKNOWN, decimals_for, fixed, mean_and_error, percent},
     results::{Rank, ResultRow, ResultTable, rank_key, ranks},
     text_table::{NO_SUCCESS, has_no_success, wrap_while},
@@ -235,7 +235,7 @@ fn plain(table: &PlainTable) -> String {
     let class: Vec<&str> =
         number_columns(table).into_iter().map(|number| if number { " class=\"number\"" } else { "" }).collect();
     let width = class.len();
-    let cell = |row: &[String], c: usize| row.get(c).map(|t| escape(t)).unwrap_or_default();
+    let cell = |row: &[String], c: usize| row.get(c).map(|t| with_code_spans(t)).unwrap_or_default();
     let row = |tag: &str, cells: &[String]| {
         let cells: String = (0..width).map(|c| format!("<{tag}{}>{}</{tag}>", class[c], cell(cells, c))).collect();
         format!("<tr>{cells}</tr>")

@@ -63,6 +63,11 @@ fn last(tag: &Tag<'_>, name: &str) -> String {
     tag(name).last().map_or("unknown".to_owned(), |(_, value)| readable(*value))
 }
 
+fn largest(tag: &Tag<'_>, name: &str) -> String {
+    let values = tag(name).iter().map(|(_, value)| *value);
+    values.reduce(f64::max).map_or("unknown".to_owned(), readable)
+}
+
 fn settings(experiment: &Experiment, tag: &Tag<'_>) -> Vec<LearningFinding> {
     let Experiment { ppo, sac, score, algorithm, .. } = experiment;
     let mut found = Vec::new();
@@ -74,9 +79,9 @@ fn settings(experiment: &Experiment, tag: &Tag<'_>) -> Vec<LearningFinding> {
         found.push(LearningFinding::new(
             Sign::LearningRate,
             format!(
-                "`{key}` is {}, and the last KL divergence of an update is {}",
+                "`{key}` is {}, and the largest KL divergence of an update is {}",
                 readable(rate),
-                last(tag, "approx_kl")
+                largest(tag, "approx_kl")
             ),
             "each step overwrites what the steps before have learned",
             &[Advice::LowerRate],
