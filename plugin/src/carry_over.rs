@@ -245,6 +245,7 @@ mod tests {
                 "LegalActions",
                 "LevelQueue",
                 "NoTimeLimit",
+                "RandomisedValues",
                 "Recording",
                 "RedrawsIllegal",
                 "Replay",
