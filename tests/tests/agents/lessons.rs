@@ -320,7 +320,7 @@ fn trainings_and_measurements_draw_the_values_of_their_levels() {
 #[test]
 fn paths_that_lead_to_no_number_are_named() {
     for (path, words) in [
-        ("Pase.0", "`Pase.0` of `randomise` names neither"),
+        ("Speed.0", "`Speed.0` of `randomise` names neither"),
         ("Pace.1", "`Pace.1` of `randomise` leads nowhere"),
         ("Pace", "`Pace` of `randomise` leads to a Pace, which is not a number"),
     ] {
