@@ -85,7 +85,7 @@ fn ends_are_valued_with_what_is_remembered(policy: &Policy, rollout: &Rollout, a
 /// Returns a trainer of policies that remember, with four Worlds.
 fn trainer(threads: usize) -> Trainer {
     let text = r#"(game: "corridor", train: "plain:0..7", test: "plain:8..15", steps: 1024, arenas: 8, worlds: 4,
-        algorithm: ppo, ppo: (num_steps: 32, minibatches: 4, hidden: [16], lr: 0.003,
+        algorithm: "ppo", ppo: (num_steps: 32, minibatches: 4, hidden: [16], lr: 0.003,
         memory: Gru(hidden: 8, sequence: 8, burn_in: 2)))"#;
     let experiment = parse_experiment(text, Path::new("test.ron")).expect("valid");
     assert_eq!((experiment.ppo.memory, experiment.algorithm), (GRU, Algorithm::Ppo));
