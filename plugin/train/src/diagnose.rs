@@ -112,10 +112,13 @@ impl FirstWarning {
     fn add(&mut self, step: u64, scalars: Vec<(&'static str, f64)>) -> Option<String> {
         self.curves.push(step, scalars.into_iter());
         let found = metrics::check(&self.experiment, &self.curves);
-        let context = Evidence::new(&self.experiment, 0).context;
-        let first = Diagnosis::new(found, Vec::new(), context).findings.into_iter().next()?;
+        if found.is_empty() {
+            // Most updates: what advice needs is put together for a finding alone.
+            return None;
+        }
         self.is_given = true;
-        Some(first.warning(&Evidence::new(&self.experiment, 0).context))
+        let diagnosis = Diagnosis::new(found, Vec::new(), Evidence::new(&self.experiment, 0).context);
+        diagnosis.findings.first().map(|first| first.warning(&diagnosis.context))
     }
 }
 

@@ -54,7 +54,7 @@ use thiserror::Error;
 /// Failure of an imitation.
 #[derive(Debug, Error)]
 pub enum ImitateError {
-    /// There is nobody to ask.
+    /// The game has no demonstrator to ask.
     #[error(
         "`{game}` has no demonstrator to ask: give it one (`ForeignGame::demonstrator`, or `BotTools::demonstrator`), or \
          imitate recordings, with --demos and without --dagger"

@@ -81,7 +81,7 @@ fn idle(set: &RecordedSet) -> Option<LearningFinding> {
             percent(share),
             counted(set.episodes.len() as u64, "recorded episode")
         ),
-        "the recorder ran while nobody played, or keys were not recorded",
+        "the recorder ran without a player, or keys were not recorded",
         &[Advice::RecordAgain, Advice::ShowRecordings],
     ))
 }

@@ -119,16 +119,7 @@ pub fn of_run(
     let mut evidence = begin(game, &experiment);
     evidence.context.run = Some(path.display().to_string());
     evidence.curves = Some(RunCurves::read(path)?);
-    let named = experiment.demos.as_deref().filter(|_| experiment.algorithm.learns_from_demos());
-    if let Some(named) = named {
-        let found = (gathering.recordings)(named);
-        match found.exists() {
-            true => read_recordings(&mut evidence, game, &found, gathering)?,
-            false => {
-                evidence.notes.push(format!("recordings are not looked at: there are none at {}", found.display()))
-            }
-        }
-    }
+    read_recordings(&mut evidence, game, gathering)?;
     if let Some(version) = Some(info.game_version).filter(|version| *version != game.version()) {
         evidence.notes.push(format!(
             "the run is of version {version} of the rules, and the game has version {}: it is played as it is now",
@@ -196,15 +187,7 @@ pub fn of_game(
     gathering: &Gathering<'_>,
 ) -> Result<Evidence, DiagnoseError> {
     let mut evidence = begin(game, experiment);
-    let named = experiment.demos.as_deref().filter(|_| experiment.algorithm.learns_from_demos());
-    if let Some(found) = named.map(gathering.recordings) {
-        match found.exists() {
-            true => read_recordings(&mut evidence, game, &found, gathering)?,
-            false => {
-                evidence.notes.push(format!("recordings are not looked at: there are none at {}", found.display()))
-            }
-        }
-    }
+    read_recordings(&mut evidence, game, gathering)?;
     // Settings alone are checked as at the start of a run.
     evidence.curves = Some(RunCurves::default());
     play_all(&mut evidence, game, None, gathering)?;
@@ -221,14 +204,16 @@ fn begin(game: &dyn Game, experiment: &Experiment) -> Evidence {
     evidence
 }
 
-fn read_recordings(
-    evidence: &mut Evidence,
-    game: &dyn Game,
-    path: &Path,
-    gathering: &Gathering<'_>,
-) -> Result<(), DiagnoseError> {
-    let set = RecordedSet::read(path)?;
-    add_recordings(evidence, game, set, gathering);
+/// Reads the recordings that the experiment learns from, if it does and they are there.
+fn read_recordings(evidence: &mut Evidence, game: &dyn Game, gathering: &Gathering<'_>) -> Result<(), DiagnoseError> {
+    let experiment = &evidence.experiment;
+    let named = experiment.demos.as_deref().filter(|_| experiment.algorithm.learns_from_demos());
+    let Some(path) = named.map(gathering.recordings) else { return Ok(()) };
+    if path.exists() {
+        add_recordings(evidence, game, RecordedSet::read(&path)?, gathering);
+    } else {
+        evidence.notes.push(format!("recordings are not looked at: there are none at {}", path.display()));
+    }
     Ok(())
 }
 
