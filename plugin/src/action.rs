@@ -29,7 +29,7 @@ use crate::{
 };
 use bevy::prelude::*;
 
-pub use playbot_learner::{ActionSpace, ActionValue};
+pub use playbot_learner::{ActionSpace, ActionValue, Actions, Choices, MixedSpace};
 
 /// The action of this tick. The holder of the [`Control`] writes it in
 /// [`PlaybotSystems::Decide`](crate::systems::PlaybotSystems::Decide); the game reads it in
@@ -46,20 +46,25 @@ impl Default for Action {
 }
 
 impl Action {
-    /// Returns the index of a discrete action, or `None` for a continuous one.
+    /// Returns the index of a discrete action, or `None` for another one.
     pub fn discrete(&self) -> Option<u32> {
         match self.0 {
             ActionValue::Discrete(index) => Some(index),
-            ActionValue::Continuous(_) => None,
+            ActionValue::Continuous(_) | ActionValue::Mixed { .. } => None,
         }
     }
 
-    /// Returns the values of a continuous action, or `None` for a discrete one.
+    /// Returns the numbers of a continuous or mixed action, or `None` for a discrete one.
     pub fn continuous(&self) -> Option<&[f32]> {
         match &self.0 {
             ActionValue::Discrete(_) => None,
-            ActionValue::Continuous(values) => Some(values),
+            ActionValue::Continuous(values) | ActionValue::Mixed { numbers: values, .. } => Some(values),
         }
+    }
+
+    /// Returns the option taken of choice number `choice`, from 0: in a discrete action there is one choice.
+    pub fn option(&self, choice: usize) -> Option<u32> {
+        self.0.options().get(choice).copied()
     }
 }
 
@@ -82,6 +87,9 @@ pub fn misfit(action: &ActionValue, space: &ActionSpace) -> Option<String> {
             .iter()
             .position(|value| !value.is_finite())
             .map(|at| format!("continuous action has {} at index {at}", values[at])),
+        (ActionValue::Mixed { choices, numbers }, ActionSpace::Mixed(space)) => space
+            .misfit(choices, numbers)
+            .map(|why| format!("the action does not fit {}: {why}", ActionSpace::Mixed(*space))),
         (action, space) => Some(format!("action {action:?} does not fit {space}")),
     }
 }

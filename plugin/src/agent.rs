@@ -95,7 +95,7 @@ pub struct AgentLimit {
 
 /// Returns whether the space holds no action.
 pub fn has_no_actions(space: &ActionSpace) -> bool {
-    matches!(space, ActionSpace::Discrete(0) | ActionSpace::Continuous(0))
+    space.is_empty()
 }
 
 /// Reports agents without any action, and agents above the game's limit, and stops those.

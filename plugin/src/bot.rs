@@ -26,7 +26,7 @@ use crate::{
     streams::AgentStreams,
 };
 use bevy::prelude::*;
-use playbot_learner::{ActionSpace, ActionValue, rng::normal};
+use playbot_learner::{ActionSpace, ActionValue, MixedSpace, rng::normal};
 use rand::RngExt;
 
 /// A scripted bot without sensors. Acts while the agent's control is [`Control::Bot`].
@@ -37,7 +37,7 @@ use rand::RngExt;
 pub enum BlindBot {
     /// The same action in every tick.
     Constant(ActionValue),
-    /// Uniformly random: over the indices of a discrete space, over [-1, 1] per continuous value.
+    /// Uniformly random: over the indices of a discrete space or of each choice, over [-1, 1] per continuous value.
     Uniform,
     /// Chaos: uniformly random actions, each held for a uniformly random number of ticks from 1 to
     /// 30. It begins anew in every episode.
@@ -106,13 +106,29 @@ pub(crate) fn run_blind_bots(
 pub fn uniform(space: &ActionSpace, rng: &mut impl rand::Rng) -> ActionValue {
     match space {
         ActionSpace::Discrete(n) => ActionValue::Discrete(rng.random_range(0..*n as u32)),
-        ActionSpace::Continuous(n) => ActionValue::Continuous((0..*n).map(|_| rng.random_range(-1.0..=1.0)).collect()),
+        ActionSpace::Continuous(n) => ActionValue::Continuous(uniform_numbers(*n, rng)),
+        ActionSpace::Mixed(MixedSpace { choices, numbers }) => ActionValue::Mixed {
+            choices: choices.sizes().iter().map(|&size| rng.random_range(0..size)).collect(),
+            numbers: uniform_numbers(*numbers, rng),
+        },
     }
+}
+
+fn uniform_numbers(count: usize, rng: &mut impl rand::Rng) -> Vec<f32> {
+    (0..count).map(|_| rng.random_range(-1.0..=1.0)).collect()
 }
 
 /// Returns a uniformly random action of a space, among the legal ones.
 pub fn legal_uniform(space: &ActionSpace, legal: Option<&LegalActions>, rng: &mut impl rand::Rng) -> ActionValue {
     let Some(legal) = legal else { return uniform(space, rng) };
+    if let ActionSpace::Mixed(MixedSpace { choices, numbers }) = space {
+        let drawn = (0..choices.sizes().len()).map(|choice| {
+            let options = legal.options(choice);
+            // Without a legal option it is a fault of this tick.
+            options.get(rng.random_range(0..options.len().max(1))).copied().unwrap_or(0)
+        });
+        return ActionValue::Mixed { choices: drawn.collect(), numbers: uniform_numbers(*numbers, rng) };
+    }
     // A mask without a legal action is a fault of this tick, so the action does not matter.
     let number = rng.random_range(0..legal.count().max(1) as u32);
     legal.pick(number).unwrap_or(ActionValue::Discrete(0))
@@ -120,7 +136,7 @@ pub fn legal_uniform(space: &ActionSpace, legal: Option<&LegalActions>, rng: &mu
 
 /// Returns the planned action of a demonstrator with noise. For discrete actions, the noise is the probability of
 /// replacing one by a uniformly random one, among the legal ones. For continuous ones, it is the standard deviation of
-/// the normal noise on each value. Zero noise draws no random number and keeps the action.
+/// the normal noise on each value. Of several choices and numbers, each has its own noise. Zero noise draws no random number and keeps the action.
 pub fn with_noise(
     planned: ActionValue,
     space: &ActionSpace,
@@ -131,11 +147,26 @@ pub fn with_noise(
     match planned {
         ActionValue::Discrete(_) if noise > 0.0 && rng.random_bool(noise.min(1.0)) => legal_uniform(space, legal, rng),
         ActionValue::Continuous(values) if noise > 0.0 => {
-            let noisy = |value: f32| (value + noise as f32 * normal(rng)).clamp(-1.0, 1.0);
-            ActionValue::Continuous(values.into_iter().map(noisy).collect())
+            ActionValue::Continuous(values.into_iter().map(|value| noisy(value, noise, rng)).collect())
+        }
+        ActionValue::Mixed { choices, numbers } if noise > 0.0 => {
+            let of_space = space.choices();
+            let random = choices.into_iter().zip(of_space.sizes()).enumerate().map(|(at, (option, &size))| {
+                if !rng.random_bool(noise.min(1.0)) {
+                    return option;
+                }
+                let options = legal.map_or_else(|| (0..size).collect(), |legal| legal.options(at));
+                options.get(rng.random_range(0..options.len().max(1))).copied().unwrap_or(option)
+            });
+            let choices = random.collect();
+            ActionValue::Mixed { choices, numbers: numbers.into_iter().map(|value| noisy(value, noise, rng)).collect() }
         }
         planned => planned,
     }
+}
+
+fn noisy(value: f32, noise: f64, rng: &mut impl rand::Rng) -> f32 {
+    (value + noise as f32 * normal(rng)).clamp(-1.0, 1.0)
 }
 
 #[cfg(test)]

@@ -20,7 +20,7 @@
 //! | keep systems in one order | [`put_in_order`], [`leave_open`], [`FaultSystems`], [`run_observe_schedule`] |
 //! | check what agents see and do | [`check_actions`], [`check_observations`], [`misfit`], [`has_no_actions`], [`AgentLimit`] |
 //! | compare two pictures of a state | [`PictureDifference`], [`CLOSE`], [`BlankEpisodes`] |
-//! | record and replay | [`record_ticks`], [`flush_unfinished`], [`demo_actions`], [`recorded_action`] |
+//! | record and replay | [`record_ticks`], [`flush_unfinished`] |
 //! | read, join, select and repair recordings | [`find_demos`], [`merge_demos`], [`select_demos`], [`relabel_demo`], [`repeated_episodes`], [`repair()`] |
 //! | read what a policy file sees | [`policy_observation`] |
 //! | let a person play in a window | [`PressesForPeople`], [`TappedKeys`] |
@@ -47,8 +47,7 @@ pub use crate::{
     agent::{AgentLimit, PlaysAlong, has_no_actions},
     demo::{
         file::{find_demos, merge_demos, relabel_demo, repair::repair, repeated_episodes, select_demos},
-        recorder::{demo_actions, flush_unfinished, record_ticks},
-        replay::recorded_action,
+        recorder::{flush_unfinished, record_ticks},
     },
     episode::{LevelTick, begin_beside, tick_of_thread},
     fault::FaultSystems,

@@ -3,7 +3,8 @@
 //! A game keeps the [`LegalActions`] of its agents up to date in [`ObserveSchedule`](crate::systems::ObserveSchedule).
 //! Random bots, the noise of demonstrators and explorers then draw among legal actions. Policies give illegal actions
 //! probability 0, in play and in training. Whatever else acts under [`Control::Bot`] and wants an illegal action plays
-//! the game's [`IdleAction`], or the lowest legal action if that is illegal too. A person may press anything, so the game
+//! the game's [`IdleAction`], or the lowest legal action if that is illegal too. Of several choices at once, an illegal
+//! one becomes its lowest legal option. A person may press anything, so the game
 //! has to ignore illegal actions. A replay plays what was recorded.
 //!
 //! ```
@@ -29,33 +30,85 @@ use bevy::prelude::*;
 
 /// The legal actions of an agent in this tick. An agent without it may take any action.
 ///
-/// Each discrete action has an entry. At least one must be legal, in each tick. Continuous actions have no mask.
+/// Each discrete action has an entry. Of several choices at once, each option of each choice has one. At least one must
+/// be legal in each choice, in each tick. Numbers have no mask.
 #[derive(Component, Clone, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(Component, CarryComponent, Clone, Debug, Default, PartialEq)]
-pub struct LegalActions(Vec<bool>);
+pub struct LegalActions {
+    mask: Vec<bool>,
+    /// The number of entries of each choice.
+    sizes: Vec<usize>,
+}
 
 impl LegalActions {
     /// Creates the mask from an entry for each action: true if it is legal.
     pub fn new(mask: impl IntoIterator<Item = bool>) -> Self {
-        Self(mask.into_iter().collect())
+        Self::of_choices([mask])
     }
 
-    /// Returns the entries.
-    pub fn mask(&self) -> &[bool] {
-        &self.0
+    /// Creates the mask of several choices at once from an entry for each option of each choice.
+    ///
+    /// ```
+    /// use bevy_playbot::{legal::LegalActions, prelude::*};
+    ///
+    /// // Right is blocked, and the agent cannot jump.
+    /// let legal = LegalActions::of_choices([vec![true, true, false], vec![true, false]]);
+    /// assert!(legal.allows(&ActionValue::Mixed { choices: vec![1, 0], numbers: vec![] }));
+    /// assert!(!legal.allows(&ActionValue::Mixed { choices: vec![1, 1], numbers: vec![] }));
+    /// ```
+    pub fn of_choices(masks: impl IntoIterator<Item = impl IntoIterator<Item = bool>>) -> Self {
+        let mut all = Self::default();
+        for mask in masks {
+            let before = all.mask.len();
+            all.mask.extend(mask);
+            all.sizes.push(all.mask.len() - before);
+        }
+        all
     }
 
-    /// Returns whether an action is legal. Continuous actions always are.
-    pub fn allows(&self, action: &ActionValue) -> bool {
-        match action {
-            ActionValue::Discrete(index) => self.0.get(*index as usize).copied().unwrap_or(false),
-            ActionValue::Continuous(_) => true,
+    /// Creates the mask of the choices of `space` from an entry for each option, choice after choice. A mask that does
+    /// not fit is a fault of the tick in which it is used.
+    pub fn of_space(space: &ActionSpace, mask: impl IntoIterator<Item = bool>) -> Self {
+        let mask: Vec<bool> = mask.into_iter().collect();
+        let sizes: Vec<usize> = space.choices().sizes().iter().map(|&size| size as usize).collect();
+        match sizes.iter().sum::<usize>() == mask.len() {
+            true => Self { mask, sizes },
+            false => Self::new(mask),
         }
     }
 
-    /// Returns the number of legal actions.
+    /// Returns the entries, choice after choice.
+    pub fn mask(&self) -> &[bool] {
+        &self.mask
+    }
+
+    /// Returns the entries of one choice; none if there is no such choice.
+    fn of_choice(&self, choice: usize) -> &[bool] {
+        let first: usize = self.sizes.iter().take(choice).sum();
+        self.sizes.get(choice).and_then(|size| self.mask.get(first..first + size)).unwrap_or_default()
+    }
+
+    /// Returns the legal options of one choice, lowest first. A discrete action is choice 0.
+    pub fn options(&self, choice: usize) -> Vec<u32> {
+        let options = (0..).zip(self.of_choice(choice));
+        options.filter_map(|(option, &is_legal)| is_legal.then_some(option)).collect()
+    }
+
+    /// Returns whether an action is legal. Numbers always are.
+    pub fn allows(&self, action: &ActionValue) -> bool {
+        let allows = |choice, option: u32| self.of_choice(choice).get(option as usize).copied().unwrap_or(false);
+        match action {
+            ActionValue::Discrete(index) => allows(0, *index),
+            ActionValue::Continuous(_) => true,
+            ActionValue::Mixed { choices, .. } => {
+                choices.iter().enumerate().all(|(choice, &option)| allows(choice, option))
+            }
+        }
+    }
+
+    /// Returns the number of legal actions: of several choices, the product of their legal options.
     pub fn count(&self) -> usize {
-        self.0.iter().filter(|&&is_legal| is_legal).count()
+        (0..self.sizes.len()).map(|choice| self.options(choice).len()).product()
     }
 
     /// Returns the action to play instead of an illegal one: the idle action, or the lowest legal one if that is illegal
@@ -65,28 +118,44 @@ impl LegalActions {
         idle.filter(|idle| self.allows(idle)).or_else(|| self.pick(0))
     }
 
-    /// Returns the legal action that `number` falls on, counted round and round; `None` if no action is legal.
+    /// Returns the legal discrete action that `number` falls on, counted round and round; `None` if no action is legal.
     pub(crate) fn pick(&self, number: u32) -> Option<ActionValue> {
-        let legal: Vec<u32> = (0..).zip(&self.0).filter_map(|(index, &is_legal)| is_legal.then_some(index)).collect();
-        let number = number as usize % legal.len().max(1);
-        legal.get(number).map(|&index| ActionValue::Discrete(index))
+        self.pick_of(0, number).map(ActionValue::Discrete)
+    }
+
+    fn pick_of(&self, choice: usize, number: u32) -> Option<u32> {
+        let legal = self.options(choice);
+        legal.get(number as usize % legal.len().max(1)).copied()
+    }
+
+    /// Returns the choices with each illegal option replaced by the legal one that `number` falls on.
+    fn corrected(&self, choices: &[u32], number: u32) -> Vec<u32> {
+        let correct = |(choice, &option): (usize, &u32)| match self.of_choice(choice).get(option as usize) {
+            Some(true) => option,
+            _ => self.pick_of(choice, number).unwrap_or(option),
+        };
+        choices.iter().enumerate().map(correct).collect()
     }
 
     /// Returns why the mask does not fit an agent's actions.
     fn misfit(&self, space: &ActionSpace) -> Option<String> {
-        match space {
-            ActionSpace::Continuous(_) => {
-                Some("it has `LegalActions` and continuous actions: a mask is for discrete ones".to_owned())
-            }
-            ActionSpace::Discrete(n) if self.0.len() != *n => Some(format!(
-                "its `LegalActions` have {} entries, and it has {space}: give each action one",
-                self.0.len()
-            )),
-            ActionSpace::Discrete(_) if !self.0.contains(&true) => Some(
-                "its `LegalActions` forbid every action: allow one that does nothing, or end the episode".to_owned(),
-            ),
-            ActionSpace::Discrete(_) => None,
+        let choices = space.choices();
+        let sizes = choices.sizes().iter().map(|&size| size as usize);
+        if choices.sizes().is_empty() {
+            return Some("it has `LegalActions` and continuous actions: a mask is for discrete ones".to_owned());
         }
+        if !sizes.eq(self.sizes.iter().copied()) {
+            let entries = match &self.sizes[..] {
+                [] => "0".to_owned(),
+                sizes => sizes.iter().map(usize::to_string).collect::<Vec<_>>().join(" and "),
+            };
+            let each =
+                if self.sizes.len() > 1 { "give each option of each choice one" } else { "give each action one" };
+            return Some(format!("its `LegalActions` have {entries} entries, and it has {space}: {each}"));
+        }
+        let forbidden = (0..self.sizes.len()).find(|&choice| !self.of_choice(choice).contains(&true))?;
+        let what = if self.sizes.len() > 1 { format!("option of choice {forbidden}") } else { "action".to_owned() };
+        Some(format!("its `LegalActions` forbid every {what}: allow one that does nothing, or end the episode"))
     }
 }
 
@@ -127,13 +196,20 @@ pub(crate) fn keep_legal(
     idle: Option<Res<IdleAction>>,
 ) {
     for (control, episode, legal, redraw, mut action) in &mut agents {
-        let is_outside = action.discrete().is_some_and(|index| index as usize >= legal.0.len());
+        let is_outside = (0..)
+            .map_while(|choice| Some((choice, action.option(choice)?)))
+            .any(|(choice, option)| option as usize >= legal.sizes.get(choice).copied().unwrap_or_default());
         let is_bot = *control == Control::Bot || (*control == Control::Replay && redraw.is_some());
         if !is_bot || !episode.is_running() || is_outside || legal.allows(&action.0) {
             continue;
         }
-        let instead = match redraw {
-            Some(RedrawsIllegal { random }) => legal.pick(*random),
+        let random = redraw.map(|RedrawsIllegal { random }| *random);
+        if let ActionValue::Mixed { choices, .. } = &mut action.0 {
+            *choices = legal.corrected(choices, random.unwrap_or(0));
+            continue;
+        }
+        let instead = match random {
+            Some(random) => legal.pick(random),
             None => legal.instead(idle.as_deref()),
         };
         if let Some(instead) = instead {
@@ -254,5 +330,38 @@ mod tests {
             let played = app.world().get::<Action>(agent).and_then(Action::discrete);
             assert_eq!(played, Some(expected), "{planned} with {random}");
         }
+    }
+
+    #[test]
+    fn each_of_several_choices_keeps_to_its_own_mask() {
+        let app_with = |mask: LegalActions, bot: BlindBot| {
+            let mut app = headless_app();
+            let space = ActionSpace::mixed([3, 2], 1);
+            let agent = app.world_mut().spawn((Agent::new(0, space), mask, Control::Bot, bot)).id();
+            (app, agent)
+        };
+        let mask = || LegalActions::of_choices([vec![false, true, true], vec![true, false]]);
+        for bot in [BlindBot::Uniform, BlindBot::Chaos] {
+            let (mut app, agent) = app_with(mask(), bot);
+            let mut seen = std::collections::BTreeSet::new();
+            for _ in 0..300 {
+                app.tick().expect("something is legal");
+                let action = app.world().get::<Action>(agent).expect("an agent has one");
+                seen.insert([0, 1].map(|choice| action.option(choice)));
+                assert!(action.continuous().is_some_and(|numbers| numbers.len() == 1));
+            }
+            assert_eq!(Vec::from_iter(seen), [[Some(1), Some(0)], [Some(2), Some(0)]]);
+        }
+        let wanted = ActionValue::Mixed { choices: vec![2, 1], numbers: vec![0.5] };
+        let (mut app, agent) = app_with(mask(), BlindBot::Constant(wanted));
+        app.tick().expect("something is legal");
+        let played = ActionValue::Mixed { choices: vec![2, 0], numbers: vec![0.5] };
+        assert_eq!(app.world().get::<Action>(agent), Some(&Action(played)), "the legal choice stays");
+        let blocked = LegalActions::of_choices([vec![true; 3], vec![false; 2]]);
+        let text = app_with(blocked, BlindBot::Uniform).0.tick().expect_err("no option").to_string();
+        assert!(text.contains("agent 0") && text.contains("tick 0") && text.contains("option of choice 1"), "{text}");
+        let short = LegalActions::new([true; 3]);
+        let text = app_with(short, BlindBot::Uniform).0.tick().expect_err("one choice").to_string();
+        assert!(text.contains("have 3 entries") && text.contains("2 choices (3 x 2)"), "{text}");
     }
 }

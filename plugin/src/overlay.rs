@@ -325,9 +325,10 @@ impl Words<'_> {
                 Some(name) => format!("{index} {name}"),
                 None => index.to_string(),
             },
-            ActionValue::Continuous(values) => {
-                let values: Vec<_> = values.iter().take(8).map(|value| format!("{value:+.2}")).collect();
-                values.join(" ")
+            ActionValue::Continuous(values) => numbers_in_words(values),
+            ActionValue::Mixed { choices, numbers } => {
+                let options = choices.iter().map(u32::to_string).collect::<Vec<_>>().join(" ");
+                format!("{options} {}", numbers_in_words(numbers)).trim_end().to_owned()
             }
         };
         // A name says what is pressed.
@@ -342,4 +343,8 @@ impl Words<'_> {
             None => action,
         }
     }
+}
+
+fn numbers_in_words(values: &[f32]) -> String {
+    values.iter().take(8).map(|value| format!("{value:+.2}")).collect::<Vec<_>>().join(" ")
 }

@@ -8,7 +8,7 @@ use crate::{
     carry_over::{ReflectCarryComponent, ReflectCarryResource},
     demo::{
         file::{DemoEpisode, DemoHeader, DemoWriter},
-        recorder::{decider, demo_actions, push_action},
+        recorder::{decider, push_action},
     },
     episode::Episode,
     fault::Fault,
@@ -93,7 +93,7 @@ pub fn note_actions(mut agents: Query<(&Agent, &Control, &Episode, &Action, &mut
             continue;
         }
         if episode.tick == 0 {
-            trace.0 = Some(DemoEpisode::new(episode.level, demo_actions(&agent.actions)));
+            trace.0 = Some(DemoEpisode::new(episode.level, agent.actions));
         }
         if let Some(trace) = &mut trace.0 {
             push_action(&mut trace.actions, &action.0);
@@ -236,14 +236,9 @@ fn report(world: &mut World, words: &str) -> String {
 /// Returns a trace with lists of equal length: the tick that panicked has no outcome yet. A trace
 /// without any tick gets its first.
 fn whole(trace: Option<DemoEpisode>, agent: &Agent, episode: &Episode) -> DemoEpisode {
-    use playbot_learner::{ActionSpace, ActionValue};
-    let mut trace = trace.unwrap_or_else(|| DemoEpisode::new(episode.level, demo_actions(&agent.actions)));
+    let mut trace = trace.unwrap_or_else(|| DemoEpisode::new(episode.level, agent.actions));
     if trace.deciders.is_empty() {
-        let nothing = match agent.actions {
-            ActionSpace::Discrete(_) => ActionValue::Discrete(0),
-            ActionSpace::Continuous(n) => ActionValue::Continuous(vec![0.0; n]),
-        };
-        push_action(&mut trace.actions, &nothing);
+        push_action(&mut trace.actions, &agent.actions.first());
         trace.deciders.push(decider(Control::Idle));
     }
     trace.rewards.resize(trace.deciders.len(), 0.0);

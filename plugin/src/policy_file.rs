@@ -148,9 +148,9 @@ pub enum PolicyMisfit {
         /// Name of this game.
         game: String,
         /// The policy's actions.
-        made_for: ActionSpace,
+        made_for: Box<ActionSpace>,
         /// The game's actions.
-        now: ActionSpace,
+        now: Box<ActionSpace>,
     },
 }
 
@@ -192,7 +192,8 @@ pub fn check_policy(game: &GameMetadata<'_>, file: &PolicyFile) -> Result<(), Po
         return Err(PolicyMisfit::NoPicture { game: name, observation_config });
     }
     if file.policy.action_space() != game.actions {
-        return Err(PolicyMisfit::Actions { game: name, made_for: file.policy.action_space(), now: game.actions });
+        let (made_for, now) = (file.policy.action_space().into(), game.actions.into());
+        return Err(PolicyMisfit::Actions { game: name, made_for, now });
     }
     let (theirs, ours) = (&metadata.actions, &game.action_names);
     match theirs.iter().zip(ours).enumerate().find(|(_, (theirs, ours))| theirs != ours) {

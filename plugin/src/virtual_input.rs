@@ -61,7 +61,7 @@ mod person;
 mod pointer;
 
 use crate::{
-    action::{ActionSpace, ActionValue, check_actions},
+    action::{ActionSpace, ActionValue, Choices, MixedSpace, check_actions},
     episode::{EpisodeEnded, StartEpisode},
     fault::Faults,
     panics::note_actions,
@@ -102,7 +102,8 @@ pub use crate::virtual_input::{
 /// The inputs that each action of an agent holds down. It maps the agent's [`Action`](crate::action::Action) to the
 /// input that a game reads from Bevy.
 ///
-/// Discrete actions name a set of keys each, continuous ones an [`ActionAxis`] for each value.
+/// Discrete actions name a set of keys each, continuous ones an [`ActionAxis`] for each value. Of several choices at
+/// once, each option of each choice names a set: see [`choices`](Self::choices).
 ///
 /// ```
 /// use bevy::prelude::*;
@@ -123,15 +124,15 @@ pub use crate::virtual_input::{
 #[reflect(Component)]
 pub struct VirtualInput {
     mapping: Mapping,
-    /// True if sets of buttons were added to continuous actions, where they have no meaning.
-    is_mixed: bool,
+    /// True if sets of buttons were added to other than discrete actions, where they have no meaning.
+    has_stray_sets: bool,
     /// True while actions hold nothing.
     is_resting: bool,
 }
 
 impl VirtualInput {
     fn new(mapping: Mapping) -> Self {
-        Self { mapping, is_mixed: false, is_resting: false }
+        Self { mapping, has_stray_sets: false, is_resting: false }
     }
 
     /// Creates a mapping with a set of keys for each discrete action; an empty set presses nothing.
@@ -147,6 +148,30 @@ impl VirtualInput {
     /// Creates a mapping with an axis for each value of a continuous action.
     pub fn axes(axes: impl IntoIterator<Item = ActionAxis>) -> Self {
         Self::new(Mapping::Continuous(axes.into_iter().collect()))
+    }
+
+    /// Creates a mapping of several choices at once, each with the inputs of its options, and of numbers beside them. It
+    /// holds those of all options that were chosen. There are at most
+    /// [`MOST_CHOICES`](playbot_learner::MOST_CHOICES); an agent with more is a fault.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use bevy_playbot::{prelude::*, virtual_input::{ActionAxis, HeldInput, VirtualInput}};
+    ///
+    /// let walk = [vec![], vec![KeyCode::ArrowLeft], vec![KeyCode::ArrowRight]].map(HeldInput::new);
+    /// let jump = [vec![], vec![KeyCode::Space]].map(HeldInput::new);
+    /// let aim = ActionAxis::stick(GamepadAxis::RightStickX);
+    /// let input = VirtualInput::choices([walk.to_vec(), jump.to_vec()], [aim]);
+    /// assert_eq!(input.space(), ActionSpace::mixed([3, 2], 1));
+    /// let held = input.held(&ActionValue::Mixed { choices: vec![2, 1], numbers: vec![0.5] });
+    /// assert_eq!((held.buttons.len(), held.axes.len()), (2, 1));
+    /// ```
+    pub fn choices(
+        choices: impl IntoIterator<Item = impl IntoIterator<Item = HeldInput>>,
+        axes: impl IntoIterator<Item = ActionAxis>,
+    ) -> Self {
+        let choices = choices.into_iter().map(|options| options.into_iter().collect()).collect();
+        Self::new(Mapping::Mixed { choices, axes: axes.into_iter().collect() })
     }
 
     /// Adds a set of mouse buttons to each discrete action, in order. For continuous actions use
@@ -206,7 +231,7 @@ impl VirtualInput {
     /// Adds a part to each discrete action, in order.
     fn each<T>(mut self, parts: impl IntoIterator<Item = T>, add: impl Fn(HeldInput, T) -> HeldInput) -> Self {
         let Mapping::Discrete(actions) = &mut self.mapping else {
-            self.is_mixed |= parts.into_iter().next().is_some();
+            self.has_stray_sets |= parts.into_iter().next().is_some();
             return self;
         };
         for (index, part) in parts.into_iter().enumerate() {
@@ -253,7 +278,7 @@ impl VirtualInput {
             Mapping::Discrete(actions) => {
                 actions.iter().position(|action| action.cursor.is_some() && action.tap.is_some())
             }
-            Mapping::Continuous(_) => None,
+            Mapping::Continuous(_) | Mapping::Mixed { .. } => None,
         }
     }
 
@@ -261,7 +286,7 @@ impl VirtualInput {
     fn positions(&self) -> impl Iterator<Item = (usize, PointerPosition)> + '_ {
         let actions = match &self.mapping {
             Mapping::Discrete(actions) => actions.as_slice(),
-            Mapping::Continuous(_) => &[],
+            Mapping::Continuous(_) | Mapping::Mixed { .. } => &[],
         };
         let positions = |held: &HeldInput| [held.cursor, held.tap].into_iter().flatten();
         actions.iter().enumerate().flat_map(move |(index, held)| positions(held).map(move |position| (index, position)))
@@ -272,6 +297,13 @@ impl VirtualInput {
         match &self.mapping {
             Mapping::Discrete(actions) => ActionSpace::Discrete(actions.len()),
             Mapping::Continuous(axes) => ActionSpace::Continuous(axes.len()),
+            Mapping::Mixed { choices, axes } => {
+                let sizes: Vec<usize> = choices.iter().map(Vec::len).collect();
+                // Without choices it has no action if there are too many.
+                let choices = Choices::new(&sizes).unwrap_or_default();
+                let numbers = if choices.sizes().len() == sizes.len() { axes.len() } else { 0 };
+                ActionSpace::Mixed(MixedSpace { choices, numbers })
+            }
         }
     }
 
@@ -288,13 +320,18 @@ impl VirtualInput {
             (Mapping::Continuous(axes), ActionValue::Continuous(values)) => {
                 axes.iter().zip(values).fold(HeldInput::default(), |held, (axis, &value)| axis.add_to(held, value))
             }
+            (Mapping::Mixed { choices, axes }, ActionValue::Mixed { choices: taken, numbers }) => {
+                let options = choices.iter().zip(taken).filter_map(|(options, &option)| options.get(option as usize));
+                let held = options.fold(HeldInput::default(), |held, option| held.and(option));
+                axes.iter().zip(numbers).fold(held, |held, (axis, &value)| axis.add_to(held, value))
+            }
             _ => HeldInput::default(),
         }
     }
 
-    /// Returns whether sets of buttons were added to continuous actions.
-    fn is_mixed(&self) -> bool {
-        self.is_mixed
+    /// Returns whether sets of buttons were added to other than discrete actions.
+    fn has_stray_sets(&self) -> bool {
+        self.has_stray_sets
     }
 
     /// Returns all inputs that any of its actions may hold or move.
@@ -307,6 +344,10 @@ impl VirtualInput {
         match &self.mapping {
             Mapping::Discrete(actions) => actions.iter().cloned().fold(HeldInput::default(), join),
             Mapping::Continuous(axes) => axes.iter().map(ActionAxis::reach).fold(HeldInput::default(), join),
+            Mapping::Mixed { choices, axes } => {
+                let held = choices.iter().flatten().cloned();
+                held.chain(axes.iter().map(ActionAxis::reach)).fold(HeldInput::default(), join)
+            }
         }
     }
 
@@ -324,6 +365,8 @@ enum Mapping {
     Discrete(Vec<HeldInput>),
     /// The inputs that each value of a continuous action moves.
     Continuous(Vec<ActionAxis>),
+    /// The inputs of each option of each choice, and those that each number moves.
+    Mixed { choices: Vec<Vec<HeldInput>>, axes: Vec<ActionAxis> },
 }
 
 /// Lets the actions of agents with a [`VirtualInput`] play through Bevy's own input. Needs

@@ -106,6 +106,8 @@ fn exchange(planted: Res<Planted>, mut commands: Commands, mut agents: Query<(En
                 values.swap(0, 1);
                 ActionValue::Continuous(values)
             }
+            // No planted game makes several choices.
+            (ActionValue::Mixed { .. }, _) => action.0.clone(),
         };
         action.0 = changed;
     }

@@ -88,7 +88,7 @@ impl Pilot {
         let output = self.0.forward(&[], &input.0[..], input.len())?;
         let row = |row| match output.greedy(row) {
             ActionValue::Continuous(torques) => <[f32; JOINTS]>::try_from(torques).ok(),
-            ActionValue::Discrete(_) => None,
+            ActionValue::Discrete(_) | ActionValue::Mixed { .. } => None,
         };
         let torques: Option<Vec<_>> = (0..input.len()).map(row).collect();
         torques.ok_or_else(|| PilotError(format!("its policy does not act with {JOINTS} torques")))

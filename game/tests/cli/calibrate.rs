@@ -2,7 +2,8 @@
 
 use std::{fs, path::Path};
 
-use bevy_playbot::demo::file::{Decider, DemoEnd, DemoEpisode, DemoHeader, DemoReader, DemoWriter, EpisodeActions};
+use bevy_playbot::action::{Actions};
+use bevy_playbot::demo::file::{Decider, DemoEnd, DemoEpisode, DemoHeader, DemoReader, DemoWriter};
 use playbot_games::coinrun::CoinRun;
 use playbot_harness::game::Game;
 
@@ -13,7 +14,7 @@ fn people(path: &Path, header: DemoHeader, ticks: &[usize]) {
     let mut writer = DemoWriter::create(path, header).expect("a fresh file");
     for (level, &ticks) in (0..).zip(ticks) {
         let episode = DemoEpisode {
-            actions: EpisodeActions::Discrete(vec![0; ticks]),
+            actions: Actions::Discrete(vec![0; ticks]),
             rewards: vec![0.0; ticks],
             state_hashes: vec![0; ticks],
             deciders: vec![Decider::Human; ticks],

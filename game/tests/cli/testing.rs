@@ -2,7 +2,8 @@
 
 use std::{fs, path::Path, process::Output};
 
-use bevy_playbot::demo::file::{Decider, DemoReader, DemoWriter, EpisodeActions};
+use bevy_playbot::action::{Actions};
+use bevy_playbot::demo::file::{Decider, DemoReader, DemoWriter};
 use serde_json::Value;
 
 use crate::program::{code, command, done, ended, errors, lines, playbot, unsealed};
@@ -338,7 +339,7 @@ fn delay(from: &Path, to: &Path, level: u64) {
             episode.rewards.push(0.0);
             episode.state_hashes.push(0);
             episode.deciders.push(Decider::Bot);
-            let EpisodeActions::Discrete(actions) = &mut episode.actions else { panic!("numbers of actions") };
+            let Actions::Discrete(actions) = &mut episode.actions else { panic!("numbers of actions") };
             actions.push(0);
         }
         writer.push(&episode).expect("writable");

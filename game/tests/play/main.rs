@@ -6,7 +6,8 @@ mod program;
 
 use std::{collections::BTreeSet, path::Path};
 
-use bevy_playbot::demo::file::{Decider, DemoEnd, DemoEpisode, DemoReader, EpisodeActions};
+use bevy_playbot::action::{Actions};
+use bevy_playbot::demo::file::{Decider, DemoEnd, DemoEpisode, DemoReader};
 use playbot_shell::Desk;
 use program::{code, command, errors, said};
 
@@ -76,7 +77,7 @@ fn a_person_wins_hands_over_and_takes_over() {
     assert_eq!((left.level_seed, left.end, episodes.len()), (1, DemoEnd::Aborted, 2));
     let runs = left.deciders.chunk_by(|a, b| a == b).map(|run| run[0]).collect::<Vec<_>>();
     assert_eq!(runs, [Decider::Human, Decider::Bot, Decider::Human]);
-    let EpisodeActions::Discrete(actions) = &left.actions else { panic!("CoinRun's actions are discrete") };
+    let Actions::Discrete(actions) = &left.actions else { panic!("CoinRun's actions are discrete") };
     let by_hand = left.deciders.iter().take_while(|who| **who == Decider::Human).count();
     let taps = actions[..by_hand].iter().filter(|action| **action == RIGHT).count();
     assert!((5..=10).contains(&taps), "five taps made {taps} steps");
@@ -104,7 +105,7 @@ fn an_ant_on_the_open_floor_is_played_with_keys() {
     let (status, said) = seat.leave();
     assert!(status.success(), "{said}");
     verified(folder.path(), "a.demo");
-    let EpisodeActions::Continuous { .. } = &episodes(folder.path(), "a.demo")[0].actions else {
+    let Actions::Continuous { .. } = &episodes(folder.path(), "a.demo")[0].actions else {
         panic!("an ant's actions are numbers")
     };
 }

@@ -422,7 +422,7 @@ mod tests {
     };
 
     use bevy::prelude::*;
-    use bevy_playbot::{action::ActionSpace, demo::file::DemoActions};
+    use bevy_playbot::action::ActionSpace;
     use playbot_harness::foreign::ForeignGame;
 
     use super::*;
@@ -529,7 +529,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("new/a.demo");
         let said = |args: OverwriteArgs, game: &str, path: &Path| {
-            let header = DemoHeader::new(game, 1, "easy", 60.0, DemoActions::Discrete(3));
+            let header = DemoHeader::new(game, 1, "easy", 60.0, ActionSpace::Discrete(3));
             args.open(path, header).map(|_| ()).map_err(|error| (error.exit_code(), error.to_string()))
         };
         let (plain, append) = (OverwriteArgs::default(), OverwriteArgs { append: true, force: false });

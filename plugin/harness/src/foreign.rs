@@ -582,10 +582,9 @@ impl Game for ForeignGame {
         if let Some(input) = self.description.input_of(place).pressed() {
             agent.insert(input);
         }
-        if (self.description.legal.is_some() || self.description.input.holds())
-            && let ActionSpace::Discrete(actions) = self.actions()
-        {
-            agent.insert(LegalActions::new(std::iter::repeat_n(true, actions)));
+        let space = self.actions();
+        if (self.description.legal.is_some() || self.description.input.holds()) && space.options() > 0 {
+            agent.insert(LegalActions::of_space(&space, std::iter::repeat_n(true, space.options())));
         }
         #[cfg(feature = "ui")]
         clicks::equip(&mut agent, self);

@@ -51,10 +51,10 @@ use crate::{
 };
 use bevy::{app::PluginGroupBuilder, prelude::*};
 use bevy_playbot::{
-    action::{ActionSpace, ActionValue},
+    action::{ActionSpace, ActionValue, MixedSpace},
     bot::BlindBot,
     demo::file::DemoHeader,
-    engine::{GameCall, demo_actions, has_no_actions},
+    engine::{GameCall, has_no_actions},
     headless::HeadlessPlugins,
     key_bindings::KeyBindings,
     observation::{Observation, ObservationSpace},
@@ -179,7 +179,7 @@ pub trait Game: Send + Sync {
 
     /// Builds the head of a recording of the game in this mode.
     fn demo_header(&self, mode: &str) -> DemoHeader {
-        let header = DemoHeader::new(self.name(), self.version(), mode, self.tick_hz(), demo_actions(&self.actions()));
+        let header = DemoHeader::new(self.name(), self.version(), mode, self.tick_hz(), self.actions());
         if is_level_files(mode) { header.with_level_files() } else { header }
     }
 
@@ -703,14 +703,21 @@ fn with_parser<Out>(game: &(impl Game + ?Sized), read: impl FnOnce(Parse) -> Out
     read(Parse::Bytes(&parse))
 }
 
-/// Returns the game's idle action: the first choice with an idle name, else choice 0; zeros for continuous actions.
+/// Returns the game's idle action: the first option with an idle name, else option 0, of each choice; zeros for numbers.
 pub fn idle_action(game: &dyn Game) -> ActionValue {
-    match game.actions() {
-        ActionSpace::Discrete(count) => {
-            let names = game.tools().input.action_names();
-            ActionValue::Discrete((0..count as u32).find(|&choice| is_named_idle(&names, choice)).unwrap_or(0))
-        }
+    let (space, names) = (game.actions(), game.tools().input.action_names());
+    let choices = space.choices();
+    let idle = choices.ranges().map(|mut at| {
+        let first = at.start;
+        (at.find(|&option| is_named_idle(&names, option as u32)).unwrap_or(first) - first) as u32
+    });
+    let mut idle: Vec<u32> = idle.collect();
+    match space {
+        ActionSpace::Discrete(_) => ActionValue::Discrete(idle.pop().unwrap_or(0)),
         ActionSpace::Continuous(count) => ActionValue::Continuous(vec![0.0; count]),
+        ActionSpace::Mixed(MixedSpace { numbers, .. }) => {
+            ActionValue::Mixed { choices: idle, numbers: vec![0.0; numbers] }
+        }
     }
 }
 
@@ -728,7 +735,7 @@ pub fn without_idle_action(game: &dyn Game) -> Option<String> {
     Some(format!("no action of {} holds nothing: while you {held}, it gets action 0{first}; add {remedy}", game.name()))
 }
 
-/// Returns whether a discrete choice does nothing, by its name.
+/// Returns whether a discrete action, or an option of all choices counted through, does nothing, by its name.
 pub fn is_named_idle(names: &[String], choice: u32) -> bool {
     let name = names.get(choice as usize).and_then(|name| name.split_whitespace().next()).unwrap_or("");
     IDLE_WORDS.contains(&name.to_lowercase().as_str())

@@ -6,11 +6,12 @@ use crate::{
     floor_plan::FloorPlan,
     game::{Game, idle_action, is_named_idle},
     held_out::{AlikeLevels, HeldOut, LevelsByLayout, by_layout_until},
+    single_actions::{SingleAction, single_actions},
     split::LevelSplit,
 };
 use bevy::math::{Rect, Vec2};
 use bevy_playbot::{bot::BlindBot, state_hash::StateHash};
-use playbot_learner::{ActionSpace, ActionValue};
+use playbot_learner::ActionValue;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Most arenas in which actions are tried. The result does not depend on them.
@@ -196,23 +197,19 @@ fn known_idle_action(game: &dyn Game) -> Option<ActionValue> {
 
 /// Returns the actions that are held, with their names.
 fn held_actions(game: &dyn Game) -> Vec<(String, ActionValue)> {
-    let names = game.tools().input.action_names();
-    let name = |index: usize| names.get(index).cloned().unwrap_or_else(|| format!("action {index}"));
-    match game.actions() {
-        ActionSpace::Discrete(count) => {
-            (0..count).map(|action| (name(action), ActionValue::Discrete(action as u32))).collect()
+    let space = game.actions();
+    let rest = (space.numbers() > 0).then(|| ("rest".to_owned(), idle_action(game)));
+    let held = single_actions(game).into_iter().flat_map(|single| {
+        let SingleAction { name, number, mut ways, .. } = single;
+        let name = name.unwrap_or_else(|| format!("action {number}"));
+        if ways.len() == 1 {
+            return ways.into_iter().map(|way| (name.clone(), way)).collect::<Vec<_>>();
         }
-        ActionSpace::Continuous(axes) => {
-            let rest = vec![0.0; axes];
-            let pushed = |axis: usize, value: f32| {
-                let mut values = rest.clone();
-                values[axis] = value;
-                (format!("{} at {value}", name(axis)), ActionValue::Continuous(values))
-            };
-            let ends = (0..axes).flat_map(|axis| [pushed(axis, -1.0), pushed(axis, 1.0)]);
-            std::iter::once(("rest".to_owned(), ActionValue::Continuous(rest.clone()))).chain(ends).collect()
-        }
-    }
+        // From the lower end to the upper one.
+        ways.reverse();
+        [-1.0, 1.0].into_iter().zip(ways).map(|(value, way)| (format!("{name} at {value}"), way)).collect()
+    });
+    rest.into_iter().chain(held).collect()
 }
 
 #[cfg(test)]

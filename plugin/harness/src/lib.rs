@@ -68,6 +68,7 @@ mod reflected_path;
 pub mod saved_episode;
 pub mod sealed_file;
 pub mod sensors;
+pub mod single_actions;
 pub mod split;
 pub mod trace;
 pub mod trails;

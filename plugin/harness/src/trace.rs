@@ -57,9 +57,9 @@ pub fn trace_actions(game: &dyn Game, request: &TraceRequest, print: Print) -> R
 
 fn read_actions(game: &dyn Game, request: &TraceRequest) -> Result<Vec<u32>, InspectError> {
     let space = game.actions();
-    if matches!(space, ActionSpace::Continuous(_)) {
+    if !matches!(space, ActionSpace::Discrete(_)) {
         return Err(InspectError::Usage(format!(
-            "`{0}` has continuous actions, which cannot be traced: watch a level with `playbot view {0} --episode`",
+            "`{0}` has {space}, which cannot be traced: watch a level with `playbot view {0} --episode`",
             game.name()
         )));
     }

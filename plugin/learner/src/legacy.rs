@@ -41,7 +41,7 @@ pub fn coinrun_penalty(kl: Tensor<1>, weight: Tensor<1>) -> Tensor<1> {
 /// # Errors
 /// [`LearnError::Shape`] or [`LearnError::Action`] if the actions do not fit a decoder of continuous actions.
 pub fn marginal_densities(decoder: &HostDist, actions: &Actions) -> Result<Vec<f32>, LearnError> {
-    let dim = decoder.dim;
+    let dim = decoder.dim();
     let (Some(stds), Actions::Continuous { dim: width, values }) = (&decoder.log_std, actions) else {
         return Err(LearnError::Action("the legacy weight for mazes needs continuous actions".to_owned()));
     };
@@ -72,6 +72,7 @@ pub fn window_starts<R: Rng + ?Sized>(steps: usize, window: usize, rng: &mut R) 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ActionSpace;
     use crate::DeviceKind;
     use crate::nn::{scalar, vector};
 
@@ -91,7 +92,11 @@ mod tests {
 
     #[test]
     fn densities_by_hand() {
-        let decoder = HostDist { dim: 2, head: vec![0.0, 1.0], log_std: Some(vec![0.0, std::f32::consts::LN_2]) };
+        let decoder = HostDist {
+            space: ActionSpace::Continuous(2),
+            head: vec![0.0, 1.0],
+            log_std: Some(vec![0.0, std::f32::consts::LN_2]),
+        };
         let action = Actions::Continuous { dim: 2, values: vec![1.0, 1.0] };
         // φ(1) + φ(0) / 2
         let got = marginal_densities(&decoder, &action).expect("they fit");

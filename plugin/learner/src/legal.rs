@@ -1,8 +1,8 @@
-//! Masks of discrete actions in learning: illegal choices have probability 0.
+//! Masks of discrete actions in learning: illegal options have probability 0.
 //!
-//! A mask has an entry for each choice of each state, row by row: true if the choice is legal. An empty mask allows
-//! everything and costs nothing. A state without any legal choice counts as one in which all are legal: no action is
-//! taken there.
+//! A mask has an entry for each option of each choice of each state, row by row: true if the option is legal. A discrete
+//! action is one choice. An empty mask allows everything and costs nothing. A choice without any legal option counts as
+//! one in which all are legal: no action is taken there.
 
 use crate::{ActionSpace, Actions, LearnError, nn::matrix};
 use burn::tensor::{Device, Tensor};
@@ -15,56 +15,66 @@ fn is_mixed(legal: &[bool]) -> bool {
     legal.contains(&true) && legal.contains(&false)
 }
 
-/// Removes the illegal choices from normalised log-probabilities, `[n, choices]`: the legal ones share their
-/// probability. Rows without illegal choices keep their bits.
-pub(crate) fn restrict(log_probs: &mut [f32], choices: usize, legal: &[bool]) {
-    let width = choices.max(1);
-    for (row, legal) in log_probs.chunks_exact_mut(width).zip(legal.chunks_exact(width)) {
-        if !is_mixed(legal) {
-            continue;
-        }
-        let allowed = || row.iter().zip(legal).filter_map(|(&x, &is_legal)| is_legal.then_some(x));
-        let top = f64::from(allowed().fold(f32::NEG_INFINITY, f32::max));
-        let total: f64 = allowed().map(|x| libm::exp(f64::from(x) - top)).sum();
-        let even = -libm::log(allowed().count() as f64);
-        for (x, &is_legal) in row.iter_mut().zip(legal) {
-            *x = match is_legal {
-                true if top.is_finite() => (f64::from(*x) - top - libm::log(total)) as f32,
-                // All legal choices had probability 0.
-                true => even as f32,
-                false => ILLEGAL,
-            };
-        }
+/// Removes the illegal options from normalised log-probabilities, `[n, dim]`: the legal ones of a choice share its
+/// probability. Choices without illegal options keep their bits, and so do the means of a vector behind the options.
+pub(crate) fn restrict(head: &mut [f32], space: &ActionSpace, legal: &[bool]) {
+    let (dim, options, choices) = (space.dim().max(1), space.options().max(1), space.choices());
+    for (row, legal) in head.chunks_exact_mut(dim).zip(legal.chunks_exact(options)) {
+        choices.ranges().for_each(|at| restrict_choice(&mut row[at.clone()], &legal[at]));
     }
 }
 
-/// Returns the numbers that are added to the logits of these rows, `[rows, choices]`: 0 for legal choices. `None`
+fn restrict_choice(row: &mut [f32], legal: &[bool]) {
+    if !is_mixed(legal) {
+        return;
+    }
+    let allowed = || row.iter().zip(legal).filter_map(|(&x, &is_legal)| is_legal.then_some(x));
+    let top = f64::from(allowed().fold(f32::NEG_INFINITY, f32::max));
+    let total: f64 = allowed().map(|x| libm::exp(f64::from(x) - top)).sum();
+    let even = -libm::log(allowed().count() as f64);
+    for (x, &is_legal) in row.iter_mut().zip(legal) {
+        *x = match is_legal {
+            true if top.is_finite() => (f64::from(*x) - top - libm::log(total)) as f32,
+            // All legal options had probability 0.
+            true => even as f32,
+            false => ILLEGAL,
+        };
+    }
+}
+
+/// Returns the numbers that are added to the logits of these rows, `[rows, options]`: 0 for legal options. `None`
 /// without a mask.
-pub(crate) fn logit_offsets(legal: &[bool], rows: &[usize], choices: usize, device: &Device) -> Option<Tensor<2>> {
+pub(crate) fn logit_offsets(legal: &[bool], rows: &[usize], space: &ActionSpace, device: &Device) -> Option<Tensor<2>> {
     if legal.is_empty() {
         return None;
     }
-    let mut offsets = Vec::with_capacity(rows.len() * choices);
+    let (options, choices) = (space.options(), space.choices());
+    let mut offsets = Vec::with_capacity(rows.len() * options);
     for &row in rows {
-        let legal = &legal[row * choices..(row + 1) * choices];
-        let illegal = if is_mixed(legal) { ILLEGAL } else { 0.0 };
-        offsets.extend(legal.iter().map(|&is_legal| if is_legal { 0.0 } else { illegal }));
+        let legal = &legal[row * options..(row + 1) * options];
+        for at in choices.ranges() {
+            let illegal = if is_mixed(&legal[at.clone()]) { ILLEGAL } else { 0.0 };
+            offsets.extend(legal[at].iter().map(|&is_legal| if is_legal { 0.0 } else { illegal }));
+        }
     }
-    Some(matrix(offsets, rows.len(), choices, device))
+    Some(matrix(offsets, rows.len(), options, device))
 }
 
-/// Returns the mean over all rows of the largest entropy that the legal choices allow, as a share of that of all
-/// choices: 1 without a mask.
-pub(crate) fn entropy_share(legal: &[bool], choices: usize) -> f64 {
-    if legal.is_empty() || choices < 2 {
+/// Returns the mean over all rows of the largest entropy that the legal options allow, as a share of that of all
+/// options: 1 without a mask. The entropies of several choices are added.
+pub(crate) fn entropy_share(legal: &[bool], space: &ActionSpace) -> f64 {
+    let choices = space.choices();
+    let of_all: f64 = choices.sizes().iter().map(|&size| libm::log(f64::from(size.max(1)))).sum();
+    if legal.is_empty() || of_all == 0.0 {
         return 1.0;
     }
-    let largest = |legal: &[bool]| match legal.iter().filter(|&&is_legal| is_legal).count() {
-        0 => 1.0,
-        count => libm::log(count as f64) / libm::log(choices as f64),
+    let of_choice = |legal: &[bool]| match legal.iter().filter(|&&is_legal| is_legal).count() {
+        0 => libm::log(legal.len() as f64),
+        count => libm::log(count as f64),
     };
-    let rows = legal.len() / choices;
-    legal.chunks_exact(choices).map(largest).sum::<f64>() / rows as f64
+    let largest = |legal: &[bool]| choices.ranges().map(|at| of_choice(&legal[at])).sum::<f64>() / of_all;
+    let options = space.options();
+    legal.chunks_exact(options).map(largest).sum::<f64>() / (legal.len() / options) as f64
 }
 
 /// Adds `rows` rows to a mask that may not exist yet: those of `more`, or rows in which everything is legal. `before`
@@ -86,14 +96,20 @@ pub(crate) fn check(legal: &[bool], space: &ActionSpace, actions: &Actions) -> R
     if legal.is_empty() {
         return Ok(());
     }
-    let (Actions::Discrete(actions), ActionSpace::Discrete(choices)) = (actions, *space) else {
+    let (options, choices) = (space.options(), space.choices());
+    if options == 0 {
         return Err(LearnError::Action(format!("a mask is for discrete actions, not for {space}")));
-    };
-    LearnError::check("rollout legal", actions.len() * choices, legal.len())?;
-    match actions.iter().zip(legal.chunks_exact(choices.max(1))).position(|(&a, legal)| !legal[a as usize]) {
-        Some(row) => Err(LearnError::Action(format!("row {row} is {}, which its mask forbids", actions[row]))),
-        None => Ok(()),
     }
+    space.check(actions)?;
+    LearnError::check("rollout legal", actions.len() * options, legal.len())?;
+    for (row, legal) in legal.chunks_exact(options).enumerate() {
+        for (at, &option) in choices.ranges().zip(actions.chosen(row)) {
+            if !legal[at][option as usize] {
+                return Err(LearnError::Action(format!("row {row} is {option}, which its mask forbids")));
+            }
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -112,7 +128,7 @@ mod tests {
     #[test]
     fn legal_choices_share_the_probability_of_illegal_ones() {
         let mut log_probs = [0.5f32, 0.2, 0.3].map(f32::ln);
-        restrict(&mut log_probs, 3, &[true, false, true]);
+        restrict(&mut log_probs, &ActionSpace::Discrete(3), &[true, false, true]);
         close(&log_probs.map(f32::exp), &[0.625, 0.0, 0.375]);
     }
 
@@ -120,9 +136,9 @@ mod tests {
     fn rows_in_which_everything_or_nothing_is_legal_keep_their_bits() {
         let before = [0.3f32, 0.7, 0.9, 0.1].map(f32::ln);
         let mut after = before;
-        restrict(&mut after, 2, &[true, true, false, false]);
+        restrict(&mut after, &ActionSpace::Discrete(2), &[true, true, false, false]);
         assert_eq!(after, before);
-        restrict(&mut after, 2, &[]);
+        restrict(&mut after, &ActionSpace::Discrete(2), &[]);
         assert_eq!(after, before);
     }
 
@@ -147,7 +163,9 @@ mod tests {
     fn masked() -> (Dist, Tensor<2>) {
         let device = DeviceKind::Flex.plain();
         let logits = matrix(vec![0.1, 0.2, 0.3, 1.0, 5.0, 2.0], 2, 3, &device.clone().autodiff()).require_grad();
-        let offsets = logit_offsets(&[true, true, true, true, false, true], &[0, 1], 3, &device).expect("a mask");
+        let offsets =
+            logit_offsets(&[true, true, true, true, false, true], &[0, 1], &ActionSpace::Discrete(3), &device)
+                .expect("a mask");
         (Dist::categorical(logits.clone() + offsets), logits)
     }
 
@@ -170,7 +188,8 @@ mod tests {
     fn divergences_of_equal_masks_are_those_of_the_legal_choices() {
         let device = DeviceKind::Flex.plain();
         let of = |logits: [f32; 3]| {
-            let offsets = logit_offsets(&[true, false, true], &[0], 3, &device).expect("a mask");
+            let offsets =
+                logit_offsets(&[true, false, true], &[0], &ActionSpace::Discrete(3), &device).expect("a mask");
             Dist::categorical(matrix(logits.to_vec(), 1, 3, &device) + offsets)
         };
         let fewer = |logits: [f32; 2]| Dist::categorical(matrix(logits.to_vec(), 1, 2, &device));
@@ -201,10 +220,10 @@ mod tests {
 
     #[test]
     fn the_share_of_entropy_is_that_of_the_legal_choices() {
-        assert_eq!(entropy_share(&[], 4), 1.0);
+        assert_eq!(entropy_share(&[], &ActionSpace::Discrete(4)), 1.0);
         let mask = [[true; 4], [true, true, false, false], [false, true, false, false]].concat();
         // 1, ½ and 0.
-        assert!((entropy_share(&mask, 4) - 0.5).abs() < 1e-12);
+        assert!((entropy_share(&mask, &ActionSpace::Discrete(4)) - 0.5).abs() < 1e-12);
     }
 
     #[test]
@@ -216,5 +235,24 @@ mod tests {
         let text = check(&[true, true, true, false], &space, &actions).expect_err("illegal").to_string();
         assert!(text.contains("row 1 is 1, which its mask forbids"), "{text}");
         assert!(check(&[true], &space, &actions).expect_err("too short").to_string().contains("rollout legal"));
+    }
+
+    #[test]
+    fn each_of_several_choices_has_its_own_mask() {
+        let space = ActionSpace::mixed([2, 3], 1);
+        let mut head = [0.5f32.ln(), 0.5f32.ln(), 0.5f32.ln(), 0.2f32.ln(), 0.3f32.ln(), 7.0];
+        // Nothing is legal of the first choice: it is left alone, as all of it.
+        restrict(&mut head, &space, &[false, false, true, false, true]);
+        close(&head[..5].iter().map(|x| x.exp()).collect::<Vec<_>>(), &[0.5, 0.5, 0.625, 0.0, 0.375]);
+        assert_eq!(head[5], 7.0, "a number has no mask");
+        let actions =
+            |options: &[u32]| Actions::Mixed { choices: 2, options: options.to_vec(), dim: 1, values: vec![0.0] };
+        let legal = [true, false, true, true, false];
+        assert!(check(&legal, &space, &actions(&[0, 1])).is_ok());
+        assert!(check(&legal, &space, &actions(&[1, 1])).is_err());
+        assert!(check(&legal, &space, &actions(&[0, 2])).is_err());
+        // ln 1 + ln 2 of ln 2 + ln 3.
+        let share = entropy_share(&legal, &space);
+        assert!((share - 2f64.ln() / 6f64.ln()).abs() < 1e-12, "{share}");
     }
 }

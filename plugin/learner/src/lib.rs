@@ -46,6 +46,7 @@ mod file;
 mod learner;
 pub mod legacy;
 mod legal;
+mod mixed_space;
 pub mod nn;
 pub mod norm;
 mod observation;
@@ -69,6 +70,7 @@ pub use crate::{
     error::{FileError, HasExitCode, LearnError, SettingError, brief_number, io_exit_code},
     file::{BrokenSeal, Unsealed, seal_json, seal_text, unseal_json, unseal_text},
     learner::{ContinuedSchedule, LearnTimes, Learner, LearnerBase, LearnerMetrics},
+    mixed_space::{Choices, MOST_CHOICES, MixedSpace},
     norm::RewardReset,
     observation::{Augmentation, ImageShape, ObsKind, ObsSlice, Observations, PictureMetadata},
     policy::{MemoryKind, Policy, PolicyOutput, StdKind},

@@ -24,7 +24,7 @@ mod sample;
 pub(crate) use crate::nn::{
     adam::FlatGrads,
     conv::PackedPixels,
-    dist::{CategoricalRows, DistRows, GaussianRows, RowTerms},
+    dist::{CategoricalRows, DistRows, GaussianRows, JointRows, RowTerms},
     params::{Init, ParamSource, RandomInit, check_loss, finite, moved, path},
     sample::{categorical_at, unsquashed_action},
 };

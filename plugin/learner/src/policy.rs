@@ -11,7 +11,7 @@ mod inputs;
 mod memory;
 
 use crate::{
-    ActionSpace, ActionValue, LearnError, ObsKind, ObsSlice, PolicySpec,
+    ActionSpace, ActionValue, Choices, LearnError, MixedSpace, ObsKind, ObsSlice, PolicySpec,
     device::guarded,
     legal::restrict,
     nn::{
@@ -154,7 +154,8 @@ impl Policy {
         n: usize,
     ) -> Result<PolicyOutput, LearnError> {
         let (mut head, mut log_std, mut values, mut after) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        let (dim, width) = (self.spec.action_space.dim(), self.memory());
+        let (space, width) = (self.spec.action_space, self.memory());
+        let (dim, numbers) = (space.dim(), space.numbers());
         self.for_each_chunk(StateBatch { z, left, memory, obs: obs.into(), n }, |(x, remembered), left, rows| {
             if let Some(remembered) = remembered {
                 after.extend_from_slice(&host(remembered)?[..rows * width]);
@@ -162,19 +163,19 @@ impl Policy {
             let dist = self.actor.forward(x.clone()).to_host()?;
             head.extend_from_slice(&dist.head[..rows * dim]);
             if let Some(stds) = dist.log_std {
-                log_std.extend_from_slice(&stds[..rows * dim]);
+                log_std.extend_from_slice(&stds[..rows * numbers]);
             }
             self.append_values(x, left, rows, &mut values)
         })?;
-        for (name, numbers) in
+        for (name, all) in
             [("actor output", &head), ("actor log_std", &log_std), ("critic output", &values), ("actor memory", &after)]
         {
             // A log-probability may be -infinity without harm.
-            if numbers.iter().any(|x| x.is_nan() || *x == f32::INFINITY) {
+            if all.iter().any(|x| x.is_nan() || *x == f32::INFINITY) {
                 return Err(LearnError::NotFinite { tensor: name.to_owned(), steps: None });
             }
         }
-        let (space, squashed) = (self.spec.action_space, self.actor.is_squashed());
+        let squashed = self.actor.is_squashed();
         Ok(PolicyOutput { space, squashed, head, log_std, values, memory: after })
     }
 
@@ -305,9 +306,10 @@ pub struct PolicyOutput {
     pub space: ActionSpace,
     /// True if a continuous action is the tanh of a normal number, which `head` and `log_std` then describe.
     pub squashed: bool,
-    /// Normalised log-probabilities (discrete) or means (continuous), `n * dim`.
+    /// Normalised log-probabilities (discrete) or means (continuous), `n * dim`. In a mixed space those of each choice,
+    /// and then the means.
     pub head: Vec<f32>,
-    /// Logarithms of the standard deviations, `n * dim`; empty if discrete.
+    /// Logarithms of the standard deviations, `n * numbers`; empty if discrete.
     pub log_std: Vec<f32>,
     /// Estimated returns, `n`; zeros if the policy has no critic.
     pub values: Vec<f32>,
@@ -328,7 +330,7 @@ impl PolicyOutput {
 
     /// Draws an action for `row` and returns it with its log-probability (or log-density).
     ///
-    /// Takes one draw from `rng` for a discrete action, one per dimension for a continuous one.
+    /// Takes one draw from `rng` for each choice, and one for each dimension of a vector.
     ///
     /// # Panics
     /// If `row` is not below [`Self::len`].
@@ -348,6 +350,22 @@ impl PolicyOutput {
                 let log_prob = gaussian_log_prob(head, self.stds(row), &action);
                 (ActionValue::Continuous(action), log_prob)
             }
+            ActionSpace::Mixed(MixedSpace { choices, .. }) => {
+                let drawn: Vec<u32> = choices.ranges().map(|at| sample_categorical(&head[at], rng)).collect();
+                let numbers = sample_gaussian(&head[choices.options()..], self.stds(row), rng);
+                let log_prob = self.mixed_log_prob(row, choices, &drawn, &numbers);
+                (ActionValue::Mixed { choices: drawn, numbers }, log_prob)
+            }
+        }
+    }
+
+    fn mixed_log_prob(&self, row: usize, choices: Choices, options: &[u32], numbers: &[f32]) -> f32 {
+        let head = self.head(row);
+        let of_choices = choices.ranges().zip(options).map(|(at, &option)| categorical_log_prob(&head[at], option));
+        let sum: f32 = of_choices.sum();
+        match numbers {
+            [] => sum,
+            numbers => sum + gaussian_log_prob(&head[choices.options()..], self.stds(row), numbers),
         }
     }
 
@@ -361,6 +379,13 @@ impl PolicyOutput {
             ActionSpace::Discrete(_) => ActionValue::Discrete(argmax(self.head(row))),
             ActionSpace::Continuous(_) if self.squashed => ActionValue::Continuous(squash(self.head(row))),
             ActionSpace::Continuous(_) => ActionValue::Continuous(self.head(row).to_vec()),
+            ActionSpace::Mixed(MixedSpace { choices, .. }) => {
+                let head = self.head(row);
+                ActionValue::Mixed {
+                    choices: choices.ranges().map(|at| argmax(&head[at])).collect(),
+                    numbers: head[choices.options()..].to_vec(),
+                }
+            }
         }
     }
 
@@ -386,14 +411,19 @@ impl PolicyOutput {
             (ActionSpace::Continuous(n), ActionValue::Continuous(a)) if a.len() == n => {
                 Ok(gaussian_log_prob(self.head(row), self.stds(row), a))
             }
+            (ActionSpace::Mixed(space), ActionValue::Mixed { choices, numbers })
+                if space.misfit(choices, numbers).is_none() =>
+            {
+                Ok(self.mixed_log_prob(row, space.choices, choices, numbers))
+            }
             (space, action) => Err(LearnError::Action(format!("{action:?} among {space}"))),
         }
     }
 
-    /// Removes the illegal choices of each row, `n * choices`, true if legal: the others share their probability.
+    /// Removes the illegal options of each row, `n * options`, true if legal: the others share their probability.
     /// Values stay unchanged. An empty mask changes nothing.
     pub fn restrict(&mut self, legal: &[bool]) {
-        restrict(&mut self.head, self.space.dim(), legal);
+        restrict(&mut self.head, &self.space, legal);
     }
 
     /// Splits the outputs into these numbers of rows, in order.
@@ -417,7 +447,7 @@ impl PolicyOutput {
     /// Returns the distributions alone.
     pub(crate) fn into_dist(self) -> HostDist {
         let log_std = (!self.log_std.is_empty()).then_some(self.log_std);
-        HostDist { dim: self.space.dim(), head: self.head, log_std }
+        HostDist { space: self.space, head: self.head, log_std }
     }
 
     fn head(&self, row: usize) -> &[f32] {
@@ -426,7 +456,7 @@ impl PolicyOutput {
     }
 
     fn stds(&self, row: usize) -> &[f32] {
-        let dim = self.space.dim();
+        let dim = self.space.numbers();
         &self.log_std[row * dim..(row + 1) * dim]
     }
 }

@@ -333,8 +333,9 @@ impl Examples {
     fn of(file: &PolicyFile, states: StateBatch<'_>) -> Result<Self, LearnError> {
         let StateBatch { z, obs, n, .. } = states;
         let output = file.policy.forward(z, obs, n)?;
-        let dim = file.policy.action_space().dim();
-        let std = |name, numbers: Vec<f32>| Output { name, width: if numbers.is_empty() { 0 } else { dim }, numbers };
+        let (dim, of_std) = (file.policy.action_space().dim(), file.policy.action_space().numbers());
+        let std =
+            |name, numbers: Vec<f32>| Output { name, width: if numbers.is_empty() { 0 } else { of_std }, numbers };
         let mut outputs = vec![
             Output { name: "head", width: dim, numbers: output.head },
             std("log_std", output.log_std),

@@ -275,6 +275,7 @@ impl PpoLearner {
         let joined = JoinedRows::of(rollout, latent, self.base.obs_stats().as_deref());
         let batch = Batch {
             rollout,
+            space: self.base.spec.action_space,
             advantages: estimate.advantages,
             returns: estimate.returns,
             intrinsic_returns,

@@ -306,7 +306,7 @@ impl Rollout {
         self.check()?;
         spec.action_space.check(&self.actions)?;
         legal::check(&self.legal, &spec.action_space, &self.actions)?;
-        self.check_legal_ends(spec.action_space.dim())?;
+        self.check_legal_ends(spec.action_space.options())?;
         spec.obs.same_as(&self.obs_kind, "the rollout")?;
         LearnError::check("latent of the rollout", latent, self.latent)?;
         if self.rows() == 0 {

@@ -156,6 +156,7 @@ impl SacLearner {
         device: DeviceKind,
     ) -> Result<LearnerBase, LearnError> {
         config.validate()?;
+        config.check_space(spec.action_space)?;
         let rewards = config.norm_reward.then(|| RewardNormalizer::new(config.gamma));
         let base = LearnerBase::new(spec, teacher, rewards, config.norm_obs, seed, device)?;
         let copies_decoder = base.copied_teacher().is_some_and(|teacher| teacher.tied_to.is_decoder());

@@ -1,6 +1,6 @@
 //! Action spaces and actions.
 
-use crate::{LearnError, ObsKind};
+use crate::{Choices, LearnError, MOST_CHOICES, MixedSpace, ObsKind};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -15,13 +15,79 @@ pub enum ActionSpace {
     /// the game. It keeps an action as it was drawn, with the density of that draw, and measures the decoder's
     /// confidence there too. Squashed policies (SAC's) stay within.
     Continuous(usize),
+    /// Several choices at once, with or without a vector of numbers: [`mixed`](Self::mixed).
+    Mixed(MixedSpace),
 }
 
 impl ActionSpace {
-    /// Returns the number of outputs of a network that acts in this space: the choices, or the vector's length.
+    /// Creates a space of several choices at once and a vector of `numbers`, as in `Continuous`. Each part is drawn by
+    /// itself: probabilities are multiplied, and entropies and divergences are added.
+    ///
+    /// ```
+    /// use playbot_learner::ActionSpace;
+    ///
+    /// // Left, right or neither; jump or not; and an angle.
+    /// let space = ActionSpace::mixed([3, 2], 1);
+    /// assert_eq!((space.dim(), space.options(), space.numbers()), (6, 5, 1));
+    /// ```
+    pub fn mixed<const CHOICES: usize>(sizes: [usize; CHOICES], numbers: usize) -> Self {
+        const { assert!(CHOICES <= MOST_CHOICES, "an agent makes at most 16 choices in one step") };
+        let choices = Choices::new(&sizes).unwrap_or_default();
+        Self::Mixed(MixedSpace { choices, numbers })
+    }
+
+    /// Returns the number of outputs of a network that acts in this space: the choices, or the vector's length. In a
+    /// mixed space these are the options of all choices, and then the numbers.
     pub fn dim(&self) -> usize {
         match *self {
             Self::Discrete(n) | Self::Continuous(n) => n,
+            Self::Mixed(mixed) => mixed.dim(),
+        }
+    }
+
+    /// Returns the choices of a step: one in a discrete space, none in a continuous one.
+    pub fn choices(&self) -> Choices {
+        match *self {
+            Self::Discrete(n) => Choices::one(n),
+            Self::Continuous(_) => Choices::default(),
+            Self::Mixed(mixed) => mixed.choices,
+        }
+    }
+
+    /// Returns the options of all choices together: the width of a mask.
+    pub fn options(&self) -> usize {
+        match *self {
+            Self::Discrete(n) => n,
+            Self::Continuous(_) => 0,
+            Self::Mixed(mixed) => mixed.choices.options(),
+        }
+    }
+
+    /// Returns the length of the vector of numbers in an action.
+    pub fn numbers(&self) -> usize {
+        match *self {
+            Self::Discrete(_) => 0,
+            Self::Continuous(n) => n,
+            Self::Mixed(mixed) => mixed.numbers,
+        }
+    }
+
+    /// Returns an action of it, for want of another one: the first options, and zeros.
+    pub fn first(&self) -> ActionValue {
+        match *self {
+            Self::Discrete(_) => ActionValue::Discrete(0),
+            Self::Continuous(n) => ActionValue::Continuous(vec![0.0; n]),
+            Self::Mixed(MixedSpace { choices, numbers }) => {
+                ActionValue::Mixed { choices: vec![0; choices.sizes().len()], numbers: vec![0.0; numbers] }
+            }
+        }
+    }
+
+    /// Returns whether it holds no action.
+    pub fn is_empty(&self) -> bool {
+        match *self {
+            Self::Discrete(n) | Self::Continuous(n) => n == 0,
+            Self::Mixed(mixed) => mixed.is_empty(),
         }
     }
 
@@ -44,18 +110,34 @@ impl ActionSpace {
                     Some(at) => Err(LearnError::Action(format!("row {} is not finite", at / n))),
                 }
             }
+            (Self::Mixed(mixed), Actions::Mixed { choices, .. }) => {
+                if mixed.choices.sizes().len() != *choices {
+                    return Err(LearnError::Action(format!("{choices} choices at once, expected {self}")));
+                }
+                let misfit = |row| mixed.misfit(actions.chosen(row), actions.vector(row));
+                match (0..actions.len()).find_map(|row| Some((row, misfit(row)?))) {
+                    None => Ok(()),
+                    Some((row, why)) => Err(LearnError::Action(format!("row {row}: {why}"))),
+                }
+            }
             (space, _) => Err(LearnError::Action(format!("wrong kind for {space}"))),
         }
     }
 }
 
-/// Writes it as `15 discrete actions`, `continuous actions of 2 numbers`.
+/// Writes it as `15 discrete actions`, `continuous actions of 2 numbers`, `actions of 2 choices (3 x 2) and 1 number`.
 impl fmt::Display for ActionSpace {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let plural = if self.dim() == 1 { "" } else { "s" };
         match self {
             Self::Discrete(n) => write!(f, "{n} discrete action{plural}"),
             Self::Continuous(n) => write!(f, "continuous actions of {n} number{plural}"),
+            Self::Mixed(MixedSpace { choices, numbers }) => {
+                let sizes: Vec<String> = choices.sizes().iter().map(u32::to_string).collect();
+                let of = |count: usize, what: &str| format!("{count} {what}{}", if count == 1 { "" } else { "s" });
+                write!(f, "actions of {} ({})", of(sizes.len(), "choice"), sizes.join(" x "))?;
+                if *numbers > 0 { write!(f, " and {}", of(*numbers, "number")) } else { Ok(()) }
+            }
         }
     }
 }
@@ -67,6 +149,32 @@ pub enum ActionValue {
     Discrete(u32),
     /// The vector.
     Continuous(Vec<f32>),
+    /// Several choices and a vector.
+    Mixed {
+        /// The option taken of each choice.
+        choices: Vec<u32>,
+        /// The vector; empty without one.
+        numbers: Vec<f32>,
+    },
+}
+
+impl ActionValue {
+    /// Returns the option taken of each choice: one of a discrete action, none of a continuous one.
+    pub fn options(&self) -> &[u32] {
+        match self {
+            Self::Discrete(index) => std::slice::from_ref(index),
+            Self::Continuous(_) => &[],
+            Self::Mixed { choices, .. } => choices,
+        }
+    }
+
+    /// Returns the vector of numbers; empty for a discrete action.
+    pub fn numbers(&self) -> &[f32] {
+        match self {
+            Self::Discrete(_) => &[],
+            Self::Continuous(numbers) | Self::Mixed { numbers, .. } => numbers,
+        }
+    }
 }
 
 /// Many actions of one space, in order.
@@ -81,6 +189,17 @@ pub enum Actions {
         /// The numbers, `dim` per action.
         values: Vec<f32>,
     },
+    /// Several choices and a vector each.
+    Mixed {
+        /// Choices of each action.
+        choices: usize,
+        /// The options taken, `choices` per action.
+        options: Vec<u32>,
+        /// Length of each vector.
+        dim: usize,
+        /// The numbers, `dim` per action.
+        values: Vec<f32>,
+    },
 }
 
 impl Actions {
@@ -89,7 +208,15 @@ impl Actions {
         match *space {
             ActionSpace::Discrete(_) => Self::Discrete(Vec::new()),
             ActionSpace::Continuous(dim) => Self::Continuous { dim, values: Vec::new() },
+            ActionSpace::Mixed(MixedSpace { choices, numbers }) => {
+                Self::Mixed { choices: choices.sizes().len(), options: Vec::new(), dim: numbers, values: Vec::new() }
+            }
         }
+    }
+
+    /// Returns the actions one by one.
+    pub fn iter(&self) -> impl Iterator<Item = ActionValue> + '_ {
+        (0..self.len()).filter_map(|row| self.get(row))
     }
 
     /// Returns the number of actions.
@@ -97,6 +224,8 @@ impl Actions {
         match self {
             Self::Discrete(values) => values.len(),
             Self::Continuous { dim, values } => values.len() / (*dim).max(1),
+            Self::Mixed { choices: 0, dim, values, .. } => values.len() / (*dim).max(1),
+            Self::Mixed { choices, options, .. } => options.len() / choices,
         }
     }
 
@@ -110,6 +239,10 @@ impl Actions {
         match self {
             Self::Discrete(values) => values.clear(),
             Self::Continuous { values, .. } => values.clear(),
+            Self::Mixed { options, values, .. } => {
+                options.clear();
+                values.clear();
+            }
         }
     }
 
@@ -119,6 +252,43 @@ impl Actions {
             Self::Discrete(values) => values.get(row).copied().map(ActionValue::Discrete),
             Self::Continuous { dim, values } => {
                 values.get(row * dim..(row + 1) * dim).map(|v| ActionValue::Continuous(v.to_vec()))
+            }
+            Self::Mixed { .. } => (row < self.len())
+                .then(|| ActionValue::Mixed { choices: self.chosen(row).to_vec(), numbers: self.vector(row).to_vec() }),
+        }
+    }
+
+    /// Returns the options of row `row`: one of a discrete action, none of a continuous one.
+    ///
+    /// # Panics
+    /// If there is no such row.
+    pub fn chosen(&self, row: usize) -> &[u32] {
+        match self {
+            Self::Discrete(values) => &values[row..=row],
+            Self::Continuous { .. } => &[],
+            Self::Mixed { choices, options, .. } => &options[row * choices..(row + 1) * choices],
+        }
+    }
+
+    /// Returns the vector of row `row`; empty of a discrete action.
+    ///
+    /// # Panics
+    /// If there is no such row.
+    pub fn vector(&self, row: usize) -> &[f32] {
+        match self {
+            Self::Discrete(_) => &[],
+            Self::Continuous { dim, values } | Self::Mixed { dim, values, .. } => &values[row * dim..(row + 1) * dim],
+        }
+    }
+
+    /// Keeps the first `n` actions.
+    pub fn truncate(&mut self, n: usize) {
+        match self {
+            Self::Discrete(values) => values.truncate(n),
+            Self::Continuous { dim, values } => values.truncate(n.saturating_mul(*dim)),
+            Self::Mixed { choices, options, dim, values } => {
+                options.truncate(n.saturating_mul(*choices));
+                values.truncate(n.saturating_mul(*dim));
             }
         }
     }
@@ -132,6 +302,12 @@ impl Actions {
             (Self::Discrete(values), ActionValue::Discrete(a)) => values.push(*a),
             (Self::Continuous { dim, values }, ActionValue::Continuous(a)) if a.len() == *dim => {
                 values.extend_from_slice(a);
+            }
+            (Self::Mixed { choices, options, dim, values }, ActionValue::Mixed { choices: taken, numbers })
+                if (taken.len(), numbers.len()) == (*choices, *dim) =>
+            {
+                options.extend_from_slice(taken);
+                values.extend_from_slice(numbers);
             }
             (all, one) => {
                 return Err(LearnError::Action(format!("{one:?} among {}", all.kind())));
@@ -149,6 +325,13 @@ impl Actions {
             (Self::Discrete(to), Self::Discrete(from)) => to.extend_from_slice(&from[start..end]),
             (Self::Continuous { dim, values }, Self::Continuous { dim: d, values: from }) if dim == d => {
                 values.extend_from_slice(&from[start * *d..end * *d]);
+            }
+            (
+                Self::Mixed { choices, options, dim, values },
+                Self::Mixed { choices: c, options: from, dim: d, values: numbers },
+            ) if (&*choices, &*dim) == (c, d) => {
+                options.extend_from_slice(&from[start * *c..end * *c]);
+                values.extend_from_slice(&numbers[start * *d..end * *d]);
             }
             (all, other) => {
                 return Err(LearnError::Action(format!("{} among {}", other.kind(), all.kind())));
@@ -170,6 +353,12 @@ impl Actions {
             (Self::Continuous { dim, values }, Self::Continuous { dim: d, values: from }) if dim == d => {
                 values[at * *d..(at + 1) * *d].copy_from_slice(&from[row * *d..(row + 1) * *d]);
             }
+            (Self::Mixed { choices, options, dim, values }, Self::Mixed { choices: c, dim: d, .. })
+                if (&*choices, &*dim) == (c, d) =>
+            {
+                options[at * *c..(at + 1) * *c].copy_from_slice(other.chosen(row));
+                values[at * *d..(at + 1) * *d].copy_from_slice(other.vector(row));
+            }
             (all, other) => {
                 return Err(LearnError::Action(format!("{} among {}", other.kind(), all.kind())));
             }
@@ -188,6 +377,12 @@ impl Actions {
                 }
                 Self::Continuous { dim: *dim, values: out }
             }
+            Self::Mixed { choices, dim, .. } => Self::Mixed {
+                choices: *choices,
+                options: rows.iter().flat_map(|&r| self.chosen(r)).copied().collect(),
+                dim: *dim,
+                values: rows.iter().flat_map(|&r| self.vector(r)).copied().collect(),
+            },
         }
     }
 
@@ -195,6 +390,7 @@ impl Actions {
         match self {
             Self::Discrete(_) => "discrete actions".to_owned(),
             Self::Continuous { dim, .. } => format!("continuous actions of width {dim}"),
+            Self::Mixed { choices, dim, .. } => format!("actions of {choices} choices and {dim} numbers"),
         }
     }
 }
@@ -219,7 +415,7 @@ impl PolicySpec {
     /// # Errors
     /// [`LearnError::Config`] if it has not.
     pub(crate) fn validate(&self) -> Result<(), LearnError> {
-        if self.obs.numbers() == 0 || self.action_space.dim() == 0 {
+        if self.obs.numbers() == 0 || self.action_space.is_empty() {
             return Err(LearnError::Config("observations and actions must not be empty".to_owned()));
         }
         Ok(())

@@ -59,9 +59,9 @@ pub use crate::demo::file::preamble::DEMO_MAGIC;
 pub use crate::demo::file::repair::{DroppedRegion, RepairReport, repair};
 pub use crate::demo::file::{
     copying::{MergeReport, merge_demos, relabel_demo, repeated_episodes, select_demos},
-    episode::{Decider, DemoEnd, DemoEpisode, EpisodeActions},
+    episode::{Decider, DemoEnd, DemoEpisode},
     error::{DemoFault, DemoFileError, EpisodeFault},
-    header::{DemoActions, DemoHeader},
+    header::DemoHeader,
     reader::DemoReader,
     writer::DemoWriter,
 };

@@ -2,11 +2,11 @@
 //!
 //! ```
 //! use bevy::prelude::*;
-//! use bevy_playbot::{demo::file::{DemoActions, DemoHeader, DemoReader, DemoWriter}, prelude::*};
+//! use bevy_playbot::{demo::file::{DemoHeader, DemoReader, DemoWriter}, prelude::*};
 //!
 //! let folder = tempfile::tempdir().expect("a folder");
 //! let path = folder.path().join("walk.demo");
-//! let header = DemoHeader::new("walk", 1, "default", 60.0, DemoActions::Discrete(2));
+//! let header = DemoHeader::new("walk", 1, "default", 60.0, ActionSpace::Discrete(2));
 //! let mut app = headless_app();
 //! app.insert_resource(Recorder::new(DemoWriter::create(&path, header)?))
 //!     // The game: an episode is won after three ticks.
@@ -22,10 +22,10 @@
 //! ```
 
 use crate::{
-    action::{Action, ActionSpace, ActionValue},
+    action::{Action, ActionValue, Actions},
     agent::{Agent, AgentOrder, Control},
     carry_over::{ReflectCarryComponent, ReflectCarryResource},
-    demo::file::{Decider, DemoActions, DemoEnd, DemoEpisode, DemoFileError, DemoWriter, EpisodeActions},
+    demo::file::{Decider, DemoEnd, DemoEpisode, DemoFileError, DemoWriter},
     episode::{Episode, EpisodeEnd},
     fault::Faults,
     level::{LevelFiles, RandomisedValues},
@@ -94,14 +94,6 @@ pub struct Recording {
     episode: Option<DemoEpisode>,
 }
 
-/// Returns the kind of actions for a recording's header.
-pub fn demo_actions(space: &ActionSpace) -> DemoActions {
-    match space {
-        ActionSpace::Discrete(n) => DemoActions::Discrete(*n),
-        ActionSpace::Continuous(n) => DemoActions::Continuous(*n),
-    }
-}
-
 pub(crate) fn decider(control: Control) -> Decider {
     match control {
         Control::Human => Decider::Human,
@@ -112,13 +104,9 @@ pub(crate) fn decider(control: Control) -> Decider {
     }
 }
 
-pub(crate) fn push_action(actions: &mut EpisodeActions, action: &ActionValue) {
-    match (actions, action) {
-        (EpisodeActions::Discrete(list), ActionValue::Discrete(index)) => list.push(*index),
-        (EpisodeActions::Continuous { values, .. }, ActionValue::Continuous(row)) => values.extend_from_slice(row),
-        // Actions that do not fit their space were reported before the game saw them.
-        _ => {}
-    }
+pub(crate) fn push_action(actions: &mut Actions, action: &ActionValue) {
+    // Actions that do not fit their space were reported before the game saw them.
+    let _ = actions.push(action);
 }
 
 /// Appends this tick to each recorded agent's episode; an ended episode goes to disk.
@@ -149,7 +137,7 @@ pub fn record_ticks(
             {
                 faults.report(error.to_string());
             }
-            let mut demo = DemoEpisode::new(episode.level, demo_actions(&agent.actions));
+            let mut demo = DemoEpisode::new(episode.level, agent.actions);
             demo.level_file = files.as_ref().and_then(|files| files.of(episode.level)).cloned();
             demo.randomised = drawn.get(entity).map(|drawn| drawn.0.clone()).unwrap_or_default();
             recording.episode = Some(demo);

@@ -5,7 +5,8 @@
 //!
 //! use bevy::prelude::*;
 //! use bevy_playbot::{
-//!     demo::{file::{Decider, DemoActions, DemoEpisode, EpisodeActions}, replay::ReplayDiverged},
+//!     action::Actions,
+//!     demo::{file::{Decider, DemoEpisode}, replay::ReplayDiverged},
 //!     prelude::*,
 //! };
 //!
@@ -13,8 +14,8 @@
 //! struct Heard(Vec<String>);
 //!
 //! // Three ticks of a game without reward. A `DemoReader` returns such episodes.
-//! let mut episode = DemoEpisode::new(7, DemoActions::Discrete(2));
-//! episode.actions = EpisodeActions::Discrete(vec![1, 0, 1]);
+//! let mut episode = DemoEpisode::new(7, ActionSpace::Discrete(2));
+//! episode.actions = Actions::Discrete(vec![1, 0, 1]);
 //! (episode.rewards, episode.state_hashes, episode.deciders) = (vec![0.0; 3], vec![0; 3], vec![Decider::Human; 3]);
 //!
 //! let mut app = headless_app();
@@ -32,10 +33,10 @@
 //! ```
 
 use crate::{
-    action::{Action, ActionValue},
+    action::Action,
     agent::Control,
     carry_over::ReflectCarryComponent,
-    demo::file::{DemoEnd, DemoEpisode, EpisodeActions},
+    demo::file::{DemoEnd, DemoEpisode},
     episode::{Episode, EpisodeEnd},
     level::{LevelFiles, LevelQueue},
     reward::Reward,
@@ -127,22 +128,12 @@ impl Replay {
     }
 }
 
-/// Returns the action of one tick of a recording.
-pub fn recorded_action(actions: &EpisodeActions, tick: usize) -> Option<ActionValue> {
-    match actions {
-        EpisodeActions::Discrete(list) => list.get(tick).map(|index| ActionValue::Discrete(*index)),
-        EpisodeActions::Continuous { dim, values } => {
-            values.get(tick * dim..(tick + 1) * dim).map(|row| ActionValue::Continuous(row.to_vec()))
-        }
-    }
-}
-
 pub(crate) fn run_replays(mut agents: Query<(&Control, &Episode, &mut Replay, &mut Action)>) {
     for (control, episode, mut replay, mut action) in &mut agents {
         if *control != Control::Replay || !episode.is_running() {
             continue;
         }
-        match recorded_action(&replay.episode.actions, episode.tick as usize) {
+        match replay.episode.actions.get(episode.tick as usize) {
             Some(value) => action.0 = value,
             None => replay.finished = true,
         }

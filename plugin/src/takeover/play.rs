@@ -4,7 +4,7 @@ use crate::{
     agent::{Agent, AgentOrder, Control},
     demo::{
         file::{DemoEpisode, DemoHeader, DemoReader, DemoWriter},
-        recorder::{Recorder, Recording, demo_actions, flush_unfinished},
+        recorder::{Recorder, Recording, flush_unfinished},
         replay::Replay,
     },
     episode::Episode,
@@ -163,7 +163,7 @@ pub(super) fn start_recording(world: &mut World, path: &Path) -> Result<(), Take
     let game = world.resource::<GameIdentity>();
     let header = DemoHeader {
         demonstrator: std::env::var("PLAYBOT_NAME").unwrap_or_else(|_| SOMEBODY.to_owned()),
-        ..DemoHeader::new(&game.name, game.version, &game.mode, tick_hz(world), demo_actions(&actions))
+        ..DemoHeader::new(&game.name, game.version, &game.mode, tick_hz(world), actions)
     };
     world.insert_resource(Recorder::new(DemoWriter::append_or_create(path, header)?));
     for agent in agents {

@@ -96,7 +96,7 @@ fn misfit(agent: &Agent, input: &VirtualInput) -> Option<String> {
             input.space()
         ));
     }
-    input.is_mixed().then(|| {
+    input.has_stray_sets().then(|| {
         format!(
             "agent {index}: its `VirtualInput` has sets of buttons for discrete actions, and it has {actions}: \
              press buttons with an axis made by `ActionAxis::buttons`"

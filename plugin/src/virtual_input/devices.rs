@@ -210,6 +210,19 @@ impl HeldInput {
         self
     }
 
+    /// Adds what another option holds at the same time.
+    pub(super) fn and(self, other: &Self) -> Self {
+        let all = Self {
+            cursor: other.cursor.or(self.cursor),
+            tap: other.tap.or(self.tap),
+            clicks: self.clicks || other.clicks,
+            text: format!("{}{}", self.text, other.text),
+            ..self
+        };
+        let all = all.hold(other.buttons.iter().copied());
+        other.axes.iter().fold(all, |all, &(axis, value)| all.push(axis, value))
+    }
+
     /// Moves the mouse cursor to this position.
     pub fn at(mut self, position: PointerPosition) -> Self {
         self.cursor = Some(position);

@@ -81,7 +81,7 @@ impl<A: InputAction> EnhancedAction<A> {
         Self::new(move |action| {
             let index = match action {
                 ActionValue::Discrete(index) => *index as usize,
-                ActionValue::Continuous(_) => 0,
+                ActionValue::Continuous(_) | ActionValue::Mixed { .. } => 0,
             };
             values.get(index).or(values.first()).copied().unwrap_or(InputValue::Bool(false))
         })

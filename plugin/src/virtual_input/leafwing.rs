@@ -200,7 +200,9 @@ fn drive<A: Actionlike>(mut agents: Agents<A>, mut states: States<A>, mut faults
 /// Sets the axes, and returns the buttons that are to be down.
 fn apply<A: Actionlike>(drives: &[(A, Drive)], value: &ActionValue, state: &mut ActionState<A>, pressed: &mut Vec<A>) {
     let number = |index: &usize| match value {
-        ActionValue::Continuous(values) => values.get(*index).copied().unwrap_or(0.0),
+        ActionValue::Continuous(values) | ActionValue::Mixed { numbers: values, .. } => {
+            values.get(*index).copied().unwrap_or(0.0)
+        }
         ActionValue::Discrete(_) => 0.0,
     };
     let mut press_if = |is_on: bool, action: &A| {

@@ -205,13 +205,40 @@ impl ClickAreas {
     }
 }
 
+impl PersonInput {
+    /// Returns the action that holds the most of what the person holds, and the buttons that the person holds without an
+    /// action for all of them.
+    fn best_of(&self, actions: &[HeldInput], window: Vec2) -> (u32, Option<Vec<VirtualButton>>) {
+        let mut best: Option<(usize, Fit)> = None;
+        for (index, action) in actions.iter().enumerate() {
+            if let Some(fit) = self.fit(action, window)
+                && best.is_none_or(|(_, best)| fit.is_better_than(best))
+            {
+                best = Some((index, fit));
+            }
+        }
+        let mut acting: Vec<VirtualButton> = Vec::new();
+        for action in actions {
+            for &button in &action.buttons {
+                if self.has(button, action.clicks) && !acting.contains(&button) {
+                    acting.push(button);
+                }
+            }
+        }
+        let is_whole =
+            best.is_some_and(|(index, _)| acting.iter().all(|button| actions[index].buttons.contains(button)));
+        let action = best.map_or(0, |(index, _)| index as u32);
+        (action, (!is_whole).then_some(acting))
+    }
+}
+
 impl VirtualInput {
     /// Returns the action that a person means, in a window of this size, and the buttons that the person holds without
     /// an action for them: see [`MissingSet`](crate::key_bindings::MissingSet).
     ///
     /// Of the discrete actions that hold nothing else than the person does, the one with the most inputs counts. Of
-    /// several positions, the one nearest to the cursor counts. Where nothing fits, action 0 does. Values of continuous
-    /// actions are those of the axes divided by their scales, limited to -1 to 1.
+    /// several positions, the one nearest to the cursor counts. Where nothing fits, action 0 does. So it is in each of
+    /// several choices. Values of continuous actions are those of the axes divided by their scales, limited to -1 to 1.
     pub fn meant_by(
         &self,
         person: &PersonInput,
@@ -223,6 +250,13 @@ impl VirtualInput {
             Mapping::Continuous(axes) => {
                 return (ActionValue::Continuous(axes.iter().map(|axis| person.value_for(axis)).collect()), None);
             }
+            Mapping::Mixed { choices, axes } => {
+                // Keys of one choice mean nothing to another one.
+                let meant = choices.iter().map(|options| person.best_of(options, window));
+                let (choices, missing): (Vec<u32>, Vec<Option<_>>) = meant.unzip();
+                let numbers = axes.iter().map(|axis| person.value_for(axis)).collect();
+                return (ActionValue::Mixed { choices, numbers }, missing.into_iter().flatten().next());
+            }
         };
         let clicked = inside(person.cursor, window).filter(|_| person.pressed.contains(&MouseButton::Left.into()));
         if let Some(action) = clicked.and_then(|cursor| clicks?.action_at(cursor)) {
@@ -230,40 +264,25 @@ impl VirtualInput {
         }
         let first_click = clicks.map_or(actions.len(), |clicks| clicks.first as usize);
         let actions = &actions[..first_click.min(actions.len())];
-        let mut best: Option<(usize, Fit)> = None;
-        for (index, action) in actions.iter().enumerate() {
-            if let Some(fit) = person.fit(action, window)
-                && best.is_none_or(|(_, best)| fit.is_better_than(best))
-            {
-                best = Some((index, fit));
-            }
-        }
-        let mut acting: Vec<VirtualButton> = Vec::new();
-        for action in actions {
-            for &button in &action.buttons {
-                if person.has(button, action.clicks) && !acting.contains(&button) {
-                    acting.push(button);
-                }
-            }
-        }
-        let is_whole =
-            best.is_some_and(|(index, _)| acting.iter().all(|button| actions[index].buttons.contains(button)));
-        let action = best.map_or(0, |(index, _)| index as u32);
-        (ActionValue::Discrete(action), (!is_whole).then_some(acting))
+        let (action, missing) = person.best_of(actions, window);
+        (ActionValue::Discrete(action), missing)
     }
 
     /// Returns false if each discrete action before number `end` needs an input: a person without any then gets
     /// action 0.
     pub fn has_idle_action(&self, end: usize) -> bool {
         match &self.mapping {
-            Mapping::Discrete(actions) => actions.iter().take(end).any(|action| {
-                let is_moved = action.axes.iter().any(|(_, wanted)| *wanted != 0.0);
-                let is_pointed = action.cursor.is_some() || action.tap.is_some();
-                action.buttons.is_empty() && action.text.is_empty() && !is_moved && !is_pointed
-            }),
+            Mapping::Discrete(actions) => actions.iter().take(end).any(holds_nothing),
             Mapping::Continuous(_) => true,
+            Mapping::Mixed { choices, .. } => choices.iter().all(|options| options.iter().any(holds_nothing)),
         }
     }
+}
+
+fn holds_nothing(action: &HeldInput) -> bool {
+    let is_moved = action.axes.iter().any(|(_, wanted)| *wanted != 0.0);
+    let is_pointed = action.cursor.is_some() || action.tap.is_some();
+    action.buttons.is_empty() && action.text.is_empty() && !is_moved && !is_pointed
 }
 
 #[cfg(test)]

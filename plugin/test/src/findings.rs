@@ -32,7 +32,7 @@ pub(crate) mod testing;
 
 use crate::findings::{
     course::{Look, look},
-    play::{Setting, listed, recorded},
+    play::{Setting, recorded},
 };
 use bevy_playbot::{
     action::ActionValue,
@@ -142,7 +142,7 @@ impl StoredFinding {
 
     /// Returns the actions, one for each tick.
     pub fn actions(&self) -> Vec<ActionValue> {
-        listed(&self.episode.actions)
+        self.episode.actions.iter().collect()
     }
 
     /// Reads a file.

@@ -496,7 +496,7 @@ fn masks(world: &World, agents: impl Iterator<Item = Entity> + Clone) -> Vec<boo
     for agent in agents {
         match (world.get::<LegalActions>(agent), world.get::<Agent>(agent)) {
             (Some(legal), _) => all.extend_from_slice(legal.mask()),
-            (None, Some(agent)) => all.extend(std::iter::repeat_n(true, agent.actions.dim())),
+            (None, Some(agent)) => all.extend(std::iter::repeat_n(true, agent.actions.options())),
             (None, None) => {}
         }
     }

@@ -9,7 +9,7 @@ mod observe;
 use crate::{Experiment, demo::observe::ObservedEpisode};
 use bevy_playbot::{
     demo::{
-        file::{DemoEnd, DemoEpisode, DemoReader, EpisodeActions},
+        file::{DemoEnd, DemoEpisode, DemoReader},
         replay::Replay,
     },
     engine::find_demos,
@@ -210,7 +210,7 @@ impl Demonstrations {
                 let earlier: &DatasetEpisode = &episodes[originals[i]];
                 earlier.observations.clone()
             };
-            episodes.push(DatasetEpisode { observations, actions: learner_actions(&demo.episode) });
+            episodes.push(DatasetEpisode { observations, actions: demo.episode.actions.clone() });
             masks.push(mask);
         }
         let (kind, space) = (self.observation_config.obs_kind(game), game.actions());
@@ -312,7 +312,7 @@ fn rollout(
         return Ok(None);
     }
     let (width, mut actions) = (kind.numbers(), Actions::empty(space));
-    actions.extend_rows(&learner_actions(episode), 0, steps)?;
+    actions.extend_rows(&episode.actions, 0, steps)?;
     let mut rollout = Rollout { steps, actions, ..Rollout::new(1, *kind, 0, space) };
     rollout.obs.push(observations.rows(0..steps, width))?;
     rollout.rewards = rewards[..steps].to_vec();
@@ -322,7 +322,8 @@ fn rollout(
     rollout.next_values = vec![0.0];
     rollout.ends.next_obs.push(observations.row(episode.len() - 1, width))?;
     if !legal.is_empty() {
-        let mask_of = |rows: Range<usize>| legal[rows.start * space.dim()..rows.end * space.dim()].to_vec();
+        let options = space.options();
+        let mask_of = |rows: Range<usize>| legal[rows.start * options..rows.end * options].to_vec();
         rollout.legal = mask_of(0..steps);
         rollout.ends.next_legal = mask_of(episode.len() - 1..episode.len());
     }
@@ -330,18 +331,13 @@ fn rollout(
 }
 
 /// Returns the actions as numbers that can be compared.
-fn bits(actions: &EpisodeActions) -> Vec<u32> {
+fn bits(actions: &Actions) -> Vec<u32> {
     match actions {
-        EpisodeActions::Discrete(list) => list.clone(),
-        EpisodeActions::Continuous { values, .. } => values.iter().map(|value| value.to_bits()).collect(),
-    }
-}
-
-/// Returns the actions of an episode as learners take them.
-pub fn learner_actions(episode: &DemoEpisode) -> Actions {
-    match &episode.actions {
-        EpisodeActions::Discrete(list) => Actions::Discrete(list.clone()),
-        EpisodeActions::Continuous { dim, values } => Actions::Continuous { dim: *dim, values: values.clone() },
+        Actions::Discrete(list) => list.clone(),
+        Actions::Continuous { values, .. } => values.iter().map(|value| value.to_bits()).collect(),
+        Actions::Mixed { options, values, .. } => {
+            options.iter().copied().chain(values.iter().map(|value| value.to_bits())).collect()
+        }
     }
 }
 
@@ -419,7 +415,6 @@ impl Demonstrations {
 pub(super) mod tests {
     use super::*;
     use bevy_playbot::{
-        demo::file::DemoActions,
         level::LevelFile,
         vision::{ImageOptions, ObservationKind},
     };
@@ -446,7 +441,7 @@ pub(super) mod tests {
         let levels = [(0, None), (1, None), (0, None), (0, Some(5)), (0, Some(6)), (3, Some(5))];
         let demos = all(levels.into_iter().map(|(seed, hash)| DemoEpisode {
             level_file: hash.map(|hash| LevelFile { path: "a.json".to_owned(), hash }),
-            ..DemoEpisode::new(seed, DemoActions::Discrete(2))
+            ..DemoEpisode::new(seed, ActionSpace::Discrete(2))
         }));
         assert_eq!(demos.levels(), [0, 1, 0, 3, 4, 3]);
         assert_eq!(demos.originals(), [0, 1, 0, 3, 4, 3], "all of them were left before their first action");
@@ -470,7 +465,7 @@ pub(super) mod tests {
 
     #[test]
     fn pictures_that_have_no_room_are_refused() {
-        let episode = DemoEpisode { state_hashes: vec![0; 10], ..DemoEpisode::new(0, DemoActions::Discrete(2)) };
+        let episode = DemoEpisode { state_hashes: vec![0; 10], ..DemoEpisode::new(0, ActionSpace::Discrete(2)) };
         let image = ImageOptions { width: 1024, height: 1024, stack: 16, ..ImageOptions::default() };
         let observation_config = ObservationConfig { kind: ObservationKind::Raster, image };
         let demos = Demonstrations { observation_config, ..all(std::iter::once(episode)) };
@@ -486,7 +481,7 @@ pub(super) mod tests {
     #[test]
     fn lost_episodes_are_left_out_where_only_won_ones_are_wanted() {
         let ended = |ends: &[DemoEnd]| {
-            all(ends.iter().map(|&end| DemoEpisode { end, ..DemoEpisode::new(0, DemoActions::Discrete(2)) }))
+            all(ends.iter().map(|&end| DemoEpisode { end, ..DemoEpisode::new(0, ActionSpace::Discrete(2)) }))
         };
         let (won, lost) = (DemoEnd::Terminated { success: true }, DemoEnd::Terminated { success: false });
         let path = Path::new("a.demo");
@@ -501,7 +496,7 @@ pub(super) mod tests {
         let all = || {
             all((0..80).map(|index| DemoEpisode {
                 state_hashes: vec![0; 10],
-                ..DemoEpisode::new(index % 8, DemoActions::Discrete(2))
+                ..DemoEpisode::new(index % 8, ActionSpace::Discrete(2))
             }))
         };
         let kept = |steps| all().at_most(steps).episodes.iter().map(|demo| demo.index).collect::<Vec<_>>();

@@ -56,11 +56,11 @@ pub enum TrainError {
         /// Observation of the model.
         model_obs: playbot_learner::ObsKind,
         /// Actions of the model.
-        model_actions: playbot_learner::ActionSpace,
+        model_actions: Box<playbot_learner::ActionSpace>,
         /// Observation of the game.
         game_obs: playbot_learner::ObsKind,
         /// Actions of the game.
-        game_actions: playbot_learner::ActionSpace,
+        game_actions: Box<playbot_learner::ActionSpace>,
     },
     /// The skill model was learned from other pictures, or from vectors.
     #[error(

@@ -761,9 +761,9 @@ fn fitting<'a>(
         return Err(TrainError::ForeignSkills {
             game: game.name().to_owned(),
             model_obs: skills.observation(),
-            model_actions: skills.action_space(),
+            model_actions: skills.action_space().into(),
             game_obs: observation,
-            game_actions: action_space,
+            game_actions: action_space.into(),
         });
     }
     match HeldOut::new(game, &experiment.test).shown_by(skills.demos()) {

@@ -5,7 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use bevy_playbot::demo::file::{Decider, DemoActions, DemoEnd, DemoEpisode, DemoHeader, DemoWriter, EpisodeActions};
+use bevy_playbot::action::{ActionSpace, Actions};
+use bevy_playbot::demo::file::{Decider, DemoEnd, DemoEpisode, DemoHeader, DemoWriter};
 use playbot_mutation::calibration::{Agreement, Calibration, CalibrationError, LevelNumbers, Measure, RankCorrelation};
 
 const WON: DemoEnd = DemoEnd::Terminated { success: true };
@@ -39,18 +40,18 @@ fn level(index: u64, solved: u64, ticks: u64) -> String {
 }
 
 fn header(name: &str) -> DemoHeader {
-    let header = DemoHeader::new("garden", 3, "bed", 20.0, DemoActions::Discrete(2));
+    let header = DemoHeader::new("garden", 3, "bed", 20.0, ActionSpace::Discrete(2));
     DemoHeader { demonstrator: name.to_owned(), ..header }
 }
 
 fn episode(level: u64, ticks: usize, end: DemoEnd, decider: Decider) -> DemoEpisode {
     DemoEpisode {
-        actions: EpisodeActions::Discrete(vec![0; ticks]),
+        actions: Actions::Discrete(vec![0; ticks]),
         rewards: vec![0.0; ticks],
         state_hashes: vec![0; ticks],
         deciders: vec![decider; ticks],
         end,
-        ..DemoEpisode::new(level, DemoActions::Discrete(2))
+        ..DemoEpisode::new(level, ActionSpace::Discrete(2))
     }
 }
 

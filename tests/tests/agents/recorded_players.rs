@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use bevy_playbot::{
+    action::{Actions},
     bot::BlindBot,
-    demo::file::{Decider, DemoEpisode, DemoReader, DemoWriter, EpisodeActions},
+    demo::file::{Decider, DemoEpisode, DemoReader, DemoWriter},
     prelude::*,
     vision::ObservationConfig,
 };
@@ -40,8 +41,8 @@ fn recorded(path: &Path, action: u32, noise: f64, seed: u64) -> Vec<DemoEpisode>
 /// Returns the share of other actions than this.
 fn others(episodes: &[DemoEpisode], action: u32) -> f64 {
     let actions = episodes.iter().flat_map(|episode| match &episode.actions {
-        EpisodeActions::Discrete(list) => list.clone(),
-        EpisodeActions::Continuous { .. } => Vec::new(),
+        Actions::Discrete(list) => list.clone(),
+        Actions::Continuous { .. } | Actions::Mixed { .. } => Vec::new(),
     });
     let (all, other) = actions.fold((0.0, 0.0), |(all, other), it| (all + 1.0, other + f64::from(it != action)));
     other / all

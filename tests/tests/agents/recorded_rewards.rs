@@ -4,8 +4,9 @@ use std::{path::Path, sync::Arc};
 
 use bevy::prelude::*;
 use bevy_playbot::{
+    action::{ActionSpace, Actions},
     demo::{
-        file::{Decider, DemoActions, DemoEnd, DemoEpisode, DemoReader, DemoWriter, EpisodeActions},
+        file::{Decider, DemoEnd, DemoEpisode, DemoReader, DemoWriter},
         replay::Divergence,
     },
     vision::ObservationConfig,
@@ -73,8 +74,8 @@ fn recordings_of_other_states_or_ends_are_refused_by_name() {
 /// Returns the divergence of three ticks without rewards in the recording, of which the second now pays a point, in a
 /// game that hashes its states or does not.
 fn divergence(hash: u32, replay: fn(Replay) -> Replay) -> Option<Divergence> {
-    let mut episode = DemoEpisode::new(7, DemoActions::Discrete(2));
-    episode.actions = EpisodeActions::Discrete(vec![1, 0, 1]);
+    let mut episode = DemoEpisode::new(7, ActionSpace::Discrete(2));
+    episode.actions = Actions::Discrete(vec![1, 0, 1]);
     (episode.rewards, episode.state_hashes, episode.deciders) = (vec![0.0; 3], vec![hash; 3], vec![Decider::Bot; 3]);
     let mut app = headless_app();
     app.add_systems(FixedUpdate, move |mut agents: Query<(&Episode, &mut Reward, &mut StateHash)>| {

@@ -4,8 +4,9 @@ use std::{path::Path, sync::Arc};
 
 use bevy::prelude::*;
 use bevy_playbot::{
+    action::{ActionSpace, Actions},
     demo::{
-        file::{Decider, DemoActions, DemoEnd, DemoHeader, DemoReader, DemoWriter, EpisodeActions, repair},
+        file::{Decider, DemoEnd, DemoHeader, DemoReader, DemoWriter, repair},
         replay::{Divergence, ReplayDiverged},
     },
     engine::flush_unfinished,
@@ -130,12 +131,12 @@ fn what_breaks_the_game_is_named_with_its_file_and_episode() {
     let (whole, path) = (folder.path().join("whole.demo"), folder.path().join("walk.demo"));
     record(&whole, header(), 5);
     // Of a game that had more actions.
-    let header = DemoHeader { actions: DemoActions::Discrete(10), ..header() };
+    let header = DemoHeader { actions: ActionSpace::Discrete(10), ..header() };
     let mut writer = DemoWriter::create(&path, header).expect("fresh");
     let episodes = DemoReader::open(&whole).expect("readable").read_all().expect("whole");
     for (index, mut episode) in episodes.into_iter().enumerate() {
         if index == 3
-            && let EpisodeActions::Discrete(actions) = &mut episode.actions
+            && let Actions::Discrete(actions) = &mut episode.actions
         {
             actions[0] = 9;
         }

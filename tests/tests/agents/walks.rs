@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use bevy::prelude::*;
-use bevy_playbot::demo::file::{Decider, DemoEnd, DemoEpisode, DemoHeader, DemoWriter, EpisodeActions};
+use bevy_playbot::action::{Actions};
+use bevy_playbot::demo::file::{Decider, DemoEnd, DemoEpisode, DemoHeader, DemoWriter};
 use playbot::prelude::*;
 use playbot_harness::{
     eval::Player,
@@ -213,7 +214,7 @@ fn a_recording_of_an_earlier_build_says_where_its_actions_lead_elsewhere() {
     let header = DemoHeader { demonstrator: "right".to_owned(), ..before.demo_header("default") };
     let mut episode = DemoEpisode::new(0, header.actions);
     let ticks = course.rewards.len();
-    episode.actions = EpisodeActions::Discrete(vec![1; ticks]);
+    episode.actions = Actions::Discrete(vec![1; ticks]);
     (episode.rewards, episode.state_hashes) = (course.rewards, course.state_hashes);
     (episode.deciders, episode.end) = (vec![Decider::Bot; ticks], DemoEnd::Terminated { success: true });
     DemoWriter::replace(&recording, header).and_then(|mut writer| writer.push(&episode)).expect("writable");

@@ -10,7 +10,8 @@ use std::{
 
 use bevy::prelude::*;
 use bevy_playbot::{
-    demo::file::{DemoEpisode, DemoHeader, DemoReader, DemoWriter, EpisodeActions},
+    action::{Actions},
+    demo::file::{DemoEpisode, DemoHeader, DemoReader, DemoWriter},
     vision::ObservationConfig,
 };
 use playbot::prelude::*;
@@ -254,7 +255,7 @@ fn a_recorded_action_counts_as_legal_in_its_tick() {
     let expected = rollouts(|_, _| {}).remove(0).legal;
     let illegal = expected[..3].iter().position(|is_legal| !is_legal).expect("one of the first two") as u32;
     let pressed = rollouts(|index, episode| {
-        if let (0, EpisodeActions::Discrete(actions)) = (index, &mut episode.actions) {
+        if let (0, Actions::Discrete(actions)) = (index, &mut episode.actions) {
             actions[0] = illegal;
         }
     });
@@ -312,7 +313,7 @@ fn where_recorded_observations_do_not_replay_everything_is_legal_and_that_is_sai
 #[test]
 fn ticks_with_one_legal_action_teach_a_skill_nothing() {
     let folder = tempfile::tempdir().expect("a folder");
-    recorded(folder.path(), Vec::new(), |_, episode| episode.actions = EpisodeActions::Discrete(vec![2; 10]));
+    recorded(folder.path(), Vec::new(), |_, episode| episode.actions = Actions::Discrete(vec![2; 10]));
     let likelihood = |game: &ForeignGame| {
         let dataset = demonstrations(folder.path()).dataset(game, 1, |_| {}).expect("keys change nothing");
         let config = experiment(Algorithm::BehaviourCloning).skills;

@@ -202,6 +202,10 @@ impl EpisodeWorld {
             ActionValue::Continuous(values) => {
                 values.iter().map(|value| format!("{value:+.2}")).collect::<Vec<_>>().join(" ")
             }
+            ActionValue::Mixed { choices, numbers } => {
+                let options = choices.iter().map(u32::to_string);
+                options.chain(numbers.iter().map(|value| format!("{value:+.2}"))).collect::<Vec<_>>().join(" ")
+            }
         }
     }
 

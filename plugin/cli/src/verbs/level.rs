@@ -102,7 +102,7 @@ fn instead(game: &dyn Game, args: &Args) -> Option<String> {
     let command = |verb: &str| format!("`{} {verb} {} {level}", program::name(), game.name());
     let trace = match game.actions() {
         ActionSpace::Discrete(_) => format!(", {} --actions 0` prints its state in each tick", command("trace")),
-        ActionSpace::Continuous(_) => String::new(),
+        ActionSpace::Continuous(_) | ActionSpace::Mixed(_) => String::new(),
     };
     let (view, play) = (command("view"), command("play"));
     Some(format!("without a plan: {view}` shows what bots observe there{trace}, and {play}` plays it in a window"))

@@ -278,13 +278,17 @@ fn check_demonstrator(game: &dyn Game) -> Result<(), CliError> {
     Err(CliError::Usage(format!("`{name}` has no demonstrator that could be recorded: {advice}")))
 }
 
-/// Checks the noise: a probability for discrete actions, a standard deviation for continuous ones.
+/// Checks the noise: a probability for discrete actions, a standard deviation for continuous ones, and both for others.
 fn check_noise(game: &dyn Game, noise: f64) -> Result<(), CliError> {
     let (fits, wanted) = match game.actions() {
         ActionSpace::Discrete(_) => ((0.0..=1.0).contains(&noise), "a probability lies between 0 and 1"),
         ActionSpace::Continuous(_) => {
             (noise.is_finite() && noise >= 0.0, "a standard deviation is a finite number, 0 or more")
         }
+        ActionSpace::Mixed(_) => (
+            (0.0..=1.0).contains(&noise),
+            "it is the probability of another option in each choice, and the deviation of each number: 0 to 1",
+        ),
     };
     if fits { Ok(()) } else { Err(CliError::Usage(format!("--noise is {noise}; {wanted}"))) }
 }
@@ -349,7 +353,8 @@ fn play(
 #[cfg(test)]
 mod tests {
     use bevy::prelude::{App, KeyCode, Res};
-    use bevy_playbot::demo::file::{DemoReader, EpisodeActions};
+    use bevy_playbot::action::{Actions};
+    use bevy_playbot::demo::file::DemoReader;
     use clap::Parser;
     use playbot_harness::{foreign::ForeignGame, level_files::LevelDesigns};
 
@@ -399,7 +404,7 @@ mod tests {
         let mut reader = DemoReader::open(&path).expect("readable");
         assert_eq!(reader.header().demonstrator, "presser");
         let episode = reader.next().expect("one episode").expect("whole");
-        assert_eq!(episode.actions, EpisodeActions::Discrete(vec![1; 3]));
+        assert_eq!(episode.actions, Actions::Discrete(vec![1; 3]));
     }
 
     #[test]

@@ -89,9 +89,9 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     }
 }
 
-/// Returns the numbers of discrete actions. A game with continuous ones refuses them itself.
+/// Returns the numbers of discrete actions. A game with other ones refuses them itself.
 fn read_actions(game: &dyn Game, words: &[String]) -> Result<Vec<u32>, CliError> {
-    if matches!(game.actions(), ActionSpace::Continuous(_)) {
+    if !matches!(game.actions(), ActionSpace::Discrete(_)) {
         return Ok(Vec::new());
     }
     let numbers: Result<Vec<u32>, String> = words.iter().map(|word| action_number(game, word.trim())).collect();

@@ -193,7 +193,8 @@ fn hand_over(mut agents: Query<(&mut Control, &Replay)>) {
 
 #[cfg(test)]
 mod tests {
-    use bevy_playbot::demo::file::{Decider, DemoActions, EpisodeActions};
+    use bevy_playbot::action::{ActionSpace, Actions};
+    use bevy_playbot::demo::file::Decider;
 
     use super::*;
 
@@ -218,8 +219,8 @@ mod tests {
 
     #[test]
     fn the_person_goes_on_behind_the_last_tick() {
-        let mut episode = DemoEpisode::new(7, DemoActions::Discrete(2));
-        episode.actions = EpisodeActions::Discrete(vec![1, 0, 1]);
+        let mut episode = DemoEpisode::new(7, ActionSpace::Discrete(2));
+        episode.actions = Actions::Discrete(vec![1, 0, 1]);
         (episode.rewards, episode.state_hashes) = (vec![0.0; 3], vec![0; 3]);
         episode.deciders = vec![Decider::Bot; 3];
         let mut app = headless_app();

@@ -14,7 +14,7 @@ use crate::split::LevelSplit;
 use bevy_playbot::{
     action::ActionValue,
     demo::file::{Decider, DemoEpisode, DemoFault, DemoFileError, DemoHeader, DemoReader},
-    engine::{recorded_action, select_demos},
+    engine::select_demos,
 };
 use playbot_learner::{HasExitCode, disk::remove_file};
 use serde::Serialize;
@@ -77,7 +77,7 @@ impl EpisodeFilter {
     /// Marks the idle start of an episode. Returns `None` if it is idle to its end.
     fn marked(&self, mut episode: DemoEpisode) -> Option<DemoEpisode> {
         let Some(idle) = &self.idle else { return Some(episode) };
-        let is_idle = |tick: &usize| recorded_action(&episode.actions, *tick).is_some_and(|action| action == *idle);
+        let is_idle = |tick: &usize| episode.actions.get(*tick).is_some_and(|action| action == *idle);
         let start = (0..episode.len()).take_while(is_idle).count();
         episode.deciders[..start].fill(Decider::Idle);
         (start < episode.len()).then_some(episode)
@@ -220,10 +220,13 @@ impl HasExitCode for FilterError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bevy_playbot::demo::file::{DemoActions, DemoEnd, DemoWriter, EpisodeActions};
+    use bevy_playbot::{
+        action::{ActionSpace, Actions},
+        demo::file::{DemoEnd, DemoWriter},
+    };
 
     fn header(player: &str) -> DemoHeader {
-        let header = DemoHeader::new("walk", 1, "easy", 60.0, DemoActions::Discrete(3));
+        let header = DemoHeader::new("walk", 1, "easy", 60.0, ActionSpace::Discrete(3));
         DemoHeader { demonstrator: player.to_owned(), ..header }
     }
 
@@ -233,12 +236,12 @@ mod tests {
         let mut rewards = vec![0.0; ticks];
         rewards[ticks - 1] = total;
         DemoEpisode {
-            actions: EpisodeActions::Discrete(actions.to_vec()),
+            actions: Actions::Discrete(actions.to_vec()),
             rewards,
             state_hashes: vec![7; ticks],
             deciders: vec![Decider::Human; ticks],
             end: DemoEnd::Terminated { success },
-            ..DemoEpisode::new(level, DemoActions::Discrete(3))
+            ..DemoEpisode::new(level, ActionSpace::Discrete(3))
         }
     }
 

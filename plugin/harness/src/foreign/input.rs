@@ -21,6 +21,10 @@ use bevy_playbot::{
     systems::{ObserveSchedule, PlaybotSystems},
     virtual_input::{ActionAxis, HeldInput, PointerPosition, PressSystems, UnknownInput, VirtualButton, VirtualInput},
 };
+use std::ops::Range;
+
+/// Most choices that an agent makes separately in one tick.
+const MOST_CHOICES_AT_ONCE: usize = playbot_learner::MOST_CHOICES;
 
 /// Most discrete actions that `.choices` may bring.
 const MOST_CHOICES: usize = 4096;
@@ -50,6 +54,28 @@ impl ForeignGame {
             .map(|choice| choice.into_iter().map(|held| held.into_iter().map(Into::into).collect()).collect())
             .collect();
         self.with(|description| description.input.choices = choices)
+    }
+
+    /// Keeps the [`choices`](Self::choices) apart instead of combining them: a policy draws each of them by itself, and
+    /// so does a bot. [`axes`](Self::axes) may stand beside them, for numbers. Choose it where combinations would be
+    /// many.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use bevy_playbot::virtual_input::ActionAxis;
+    /// use playbot_harness::{foreign::ForeignGame, prelude::*};
+    ///
+    /// let walk = vec![vec![], vec![KeyCode::ArrowLeft], vec![KeyCode::ArrowRight]];
+    /// let jump = vec![vec![], vec![KeyCode::Space]];
+    /// let game = ForeignGame::new("hop", 1, |_: &mut App| {}).choices([walk, jump]).separately();
+    /// let game = game.axes([ActionAxis::stick(GamepadAxis::RightStickX)]).observe(["x"], || [0.0]);
+    /// assert_eq!(Game::actions(&game), ActionSpace::mixed([3, 2], 1));
+    /// assert_eq!(game.problem(), None);
+    /// let names = game.tools().input.action_names();
+    /// assert_eq!(names, ["nothing", "ArrowLeft", "ArrowRight", "nothing", "Space"]);
+    /// ```
+    pub fn separately(self) -> Self {
+        self.with(|description| description.input.separate = true)
     }
 
     /// Adds positions of the mouse cursor to discrete actions, in the order of the actions; `None` leaves the cursor
@@ -127,7 +153,8 @@ impl ForeignGame {
         self.with(|description| description.input.clicks = buttons.into_iter().map(Into::into).collect())
     }
 
-    /// Declares the legal actions of each tick: one value for each discrete action, true if it is legal. Random bots,
+    /// Declares the legal actions of each tick: one value for each discrete action, true if it is legal. With choices that
+    /// are made [`separately`](Self::separately), it is one value for each option of each choice, choice after choice. Random bots,
     /// the noise of demonstrators and explorers then draw among legal actions only, and policies give the others
     /// probability 0. The system may run more than once in a tick, so it must change nothing.
     ///
@@ -162,7 +189,7 @@ impl ForeignGame {
     /// one, bots, explorers and policies repeat it: it is the only legal action. Held keys stay pressed, while clicks
     /// and taps are made in each tick. Rewards, recordings, time limits and skill intervals count ticks, as ever.
     ///
-    /// People decide in each tick. Continuous actions have no mask, so they cannot be held: that is a
+    /// People decide in each tick. Numbers of actions have no mask, so they cannot be held: that is a
     /// [`problem`](crate::game::Game::problem).
     ///
     /// ```
@@ -215,6 +242,8 @@ pub(super) struct Input {
     pub(super) keys: Vec<Vec<VirtualButton>>,
     /// The choices whose combinations are the discrete actions, in place of keys.
     pub(super) choices: Vec<Vec<Vec<VirtualButton>>>,
+    /// True if each choice is made by itself, and they are not combined.
+    pub(super) separate: bool,
     /// The first unknown name of a key, and its action.
     pub(super) unknown_key: Option<(usize, UnknownInput)>,
     /// The mouse buttons of each discrete action.
@@ -292,6 +321,11 @@ impl Input {
         let is_discrete = is_pointed || is_held || !self.texts.is_empty();
         let base = match (&self.whole, &self.axes) {
             (Some(whole), _) => whole.clone(),
+            (None, axes) if self.is_separate() => {
+                let held =
+                    |options: &Vec<Vec<VirtualButton>>| options.iter().cloned().map(HeldInput::new).collect::<Vec<_>>();
+                VirtualInput::choices(self.choices.iter().map(held), axes.iter().flatten().cloned())
+            }
             (None, Some(axes)) => VirtualInput::axes(axes.iter().cloned()),
             (None, None) if is_discrete => VirtualInput::discrete(sets.into_iter().map(HeldInput::new)),
             (None, None) => return None,
@@ -302,7 +336,7 @@ impl Input {
                 let pointed = buttons.cursor(self.cursor.clone()).taps(self.taps.clone()).wheel(self.wheel.clone());
                 Some(pointed.and_actions(self.texts.iter().map(|text| HeldInput::default().types(text))))
             }
-            ActionSpace::Continuous(_) => Some(base),
+            ActionSpace::Continuous(_) | ActionSpace::Mixed(_) => Some(base),
         }
     }
 
@@ -336,7 +370,7 @@ impl Input {
         let said = [
             ("`.keys`", !self.keys.is_empty()),
             ("`.choices`", !self.choices.is_empty()),
-            ("`.axes`", self.axes.is_some()),
+            ("`.axes`", self.axes.is_some() && !self.is_separate()),
             ("`.input`", self.whole.is_some()),
         ];
         let said: Vec<&str> = said.into_iter().filter_map(|(name, is_said)| is_said.then_some(name)).collect();
@@ -370,13 +404,22 @@ impl Input {
             ("`.clicks`", !self.clicks.is_empty()),
         ];
         let (part, _) = discrete.into_iter().find(|(_, is_said)| *is_said)?;
-        let is_continuous = matches!(pressed.space(), ActionSpace::Continuous(_));
-        is_continuous.then(|| {
-            format!(
+        match pressed.space() {
+            ActionSpace::Discrete(_) => None,
+            ActionSpace::Continuous(_) => Some(format!(
                 "has {part}, which belong to discrete actions, and continuous ones: buttons of these are \
                  `ActionAxis::buttons` in `.axes`"
-            )
-        })
+            )),
+            ActionSpace::Mixed(_) => Some(format!(
+                "has {part}, which belong to combined actions, and `.separately`: name buttons of mouse and gamepad in \
+                 `.choices`, or leave `.separately` out"
+            )),
+        }
+    }
+
+    /// Returns whether each of its choices is made by itself.
+    fn is_separate(&self) -> bool {
+        self.separate && !self.choices.is_empty()
     }
 
     /// Returns the problem of the choices and of the texts.
@@ -384,10 +427,18 @@ impl Input {
         if let Some(number) = self.choices.iter().position(Vec::is_empty) {
             return Some(format!("has `.choices` with nothing to choose in choice {number}: give it sets of keys"));
         }
-        if self.combinations().is_none() {
+        if self.separate && self.choices.is_empty() {
+            return Some("has `.separately` and no `.choices` to keep apart: add them, or leave it out".to_owned());
+        }
+        if self.is_separate() && self.choices.len() > MOST_CHOICES_AT_ONCE {
             return Some(format!(
-                "has `.choices` with more than {MOST_CHOICES} combinations: leave some out, or use `ActionAxis::buttons` in \
-                 `.axes`"
+                "makes {} choices separately, and {MOST_CHOICES_AT_ONCE} are possible: combine some of them",
+                self.choices.len()
+            ));
+        }
+        if !self.is_separate() && self.combinations().is_none() {
+            return Some(format!(
+                "has `.choices` with more than {MOST_CHOICES} combinations: leave some out, or make them `.separately`"
             ));
         }
         if self.wheel.iter().any(|lines| !lines.is_finite()) {
@@ -405,7 +456,7 @@ impl Input {
 
     /// Returns the keys and buttons of each discrete action: those that were set, or the combinations of the choices.
     fn sets(&self) -> Vec<Vec<VirtualButton>> {
-        if self.choices.is_empty() || self.combinations().is_none() {
+        if self.is_separate() || self.choices.is_empty() || self.combinations().is_none() {
             return self.keys.clone();
         }
         self.choices.iter().fold(vec![Vec::new()], |sets, choice| {
@@ -439,8 +490,8 @@ impl Input {
             (0, _) => Some(
                 "has `.every(0)`, but a decision holds for at least one tick: type `.every(1)`, or leave it out".to_owned(),
             ),
-            (2.., ActionSpace::Continuous(_)) => Some(
-                "has `.every` and continuous actions, which cannot be held: leave `.every` out, and lower `.hz` for fewer \
+            (2.., space) if space.numbers() > 0 => Some(
+                "has `.every` and actions with numbers, which cannot be held: leave `.every` out, and lower `.hz` for fewer \
                  decisions a second"
                     .to_owned(),
             ),
@@ -512,6 +563,9 @@ impl Input {
         let of_clicks = self.clicks.iter().map(|name| format!("click {name}"));
         let sets = self.sets();
         let others = self.texts.len() + self.clicks.len();
+        if self.is_separate() && self.space.is_none() {
+            return self.choices.iter().flatten().map(|held| name_of_keys(held)).collect();
+        }
         let ActionSpace::Discrete(actions) = self.space() else { return Vec::new() };
         if actions == sets.len() + others {
             return sets.iter().map(|set| name_of_keys(set)).chain(of_texts).chain(of_clicks).collect();
@@ -596,7 +650,7 @@ impl InputTools for ForeignGame {
         let pressed = input.pressed().filter(|_| input.space.is_none());
         pressed.is_none_or(|pressed| match pressed.space() {
             ActionSpace::Discrete(actions) => pressed.has_idle_action(actions - input.clicks.len()),
-            ActionSpace::Continuous(_) => true,
+            ActionSpace::Continuous(_) | ActionSpace::Mixed(_) => pressed.has_idle_action(0),
         })
     }
 }
@@ -640,7 +694,7 @@ fn decide_for(world: &mut World, agent: Entity) {
         let held = foreign.held_in(tick);
         // It sees every tick, since it may count them.
         let planned = foreign.asked().bot(name)?.demand(world)?;
-        Ok(held.map_or(planned, ActionValue::Discrete))
+        Ok(held.unwrap_or(planned))
     });
     let Some(planned) = planned else { return };
     let mut entity = world.entity_mut(agent);
@@ -655,7 +709,7 @@ fn decide_for(world: &mut World, agent: Entity) {
 pub(super) fn hold(world: &mut World) {
     for agent in playing_agents(world) {
         let tick = world.get::<Episode>(agent).map_or(0, |episode| episode.tick);
-        let action = world.get::<Action>(agent).and_then(Action::discrete);
+        let action = world.get::<Action>(agent).map(|action| action.0.clone());
         with_foreign(world, agent, |_, foreign| {
             if foreign.game.description.input.is_decision(tick) {
                 foreign.asked().held = action;
@@ -712,17 +766,28 @@ pub(super) fn mask(world: &mut World) {
     for agent in playing_agents(world) {
         let tick = world.get::<Episode>(agent).map_or(0, |episode| episode.tick);
         let legal = with_foreign(world, agent, |world, foreign| {
-            let actions = foreign.game.description.input.space().dim() as u32;
-            match (foreign.held_in(tick), &mut foreign.asked().legal) {
-                (Some(held), _) => Ok((0..actions).map(|action| action == held).collect()),
-                (None, Some(system)) => system.demand(world),
-                (None, None) => Ok(vec![true; actions as usize]),
-            }
+            let space = foreign.game.description.input.space();
+            let mask = match (foreign.held_in(tick), &mut foreign.asked().legal) {
+                (Some(held), _) => only(&held, &space),
+                (None, Some(system)) => system.demand(world)?,
+                (None, None) => vec![true; space.options()],
+            };
+            Ok(LegalActions::of_space(&space, mask))
         });
         if let Some(legal) = legal {
-            note(world, agent, Some(LegalActions::new(legal)));
+            note(world, agent, Some(legal));
         }
     }
+}
+
+/// Returns the mask that allows this action alone.
+fn only(held: &ActionValue, space: &ActionSpace) -> Vec<bool> {
+    let held = Action(held.clone());
+    let is_held = |(choice, at): (usize, Range<usize>)| {
+        let taken = held.option(choice);
+        (0..at.len()).map(move |option| taken == Some(option as u32)).collect::<Vec<_>>()
+    };
+    space.choices().ranges().enumerate().flat_map(is_held).collect()
 }
 
 #[cfg(test)]

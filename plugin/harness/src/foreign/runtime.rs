@@ -74,7 +74,7 @@ pub(super) struct AgentParts {
     pub(super) act: Option<OwnedSystem<()>>,
     pub(super) legal: Option<OwnedSystem<Vec<bool>>>,
     /// The last decision, if decisions hold for several ticks.
-    pub(super) held: Option<u32>,
+    pub(super) held: Option<ActionValue>,
     pub(super) demonstrator: Option<OwnedSystem<ActionValue>>,
     /// The other scripted bots, with their names.
     pub(super) bots: Vec<(&'static str, OwnedSystem<ActionValue>)>,
@@ -216,12 +216,12 @@ impl Foreign {
     }
 
     /// Returns the decision of the agent that is asked about, if it still holds in this tick of an episode.
-    pub(super) fn held_in(&self, tick: u32) -> Option<u32> {
-        if self.game.description.input.is_decision(tick) { None } else { self.agents[self.asked].held }
+    pub(super) fn held_in(&self, tick: u32) -> Option<ActionValue> {
+        if self.game.description.input.is_decision(tick) { None } else { self.agents[self.asked].held.clone() }
     }
 
     /// Returns the last decisions of all agents.
-    pub(super) fn held(&mut self) -> impl Iterator<Item = &mut Option<u32>> {
+    pub(super) fn held(&mut self) -> impl Iterator<Item = &mut Option<ActionValue>> {
         self.agents.iter_mut().map(|parts| &mut parts.held)
     }
 }
@@ -593,7 +593,8 @@ impl IntoValues for Vec<f32> {
     }
 }
 
-/// The action of a scripted bot.
+/// The action of a scripted bot. An array of whole numbers has the option taken of each of several choices, and numbers
+/// may follow it in a pair.
 pub trait IntoActionValue: 'static {
     /// Returns the action.
     fn into_action(self) -> ActionValue;
@@ -621,6 +622,18 @@ impl IntoActionValue for usize {
 impl IntoActionValue for i32 {
     fn into_action(self) -> ActionValue {
         ActionValue::Discrete(u32::try_from(self).unwrap_or(u32::MAX))
+    }
+}
+
+impl<const N: usize> IntoActionValue for [u32; N] {
+    fn into_action(self) -> ActionValue {
+        ActionValue::Mixed { choices: self.into(), numbers: Vec::new() }
+    }
+}
+
+impl<const N: usize, const M: usize> IntoActionValue for ([u32; N], [f32; M]) {
+    fn into_action(self) -> ActionValue {
+        ActionValue::Mixed { choices: self.0.into(), numbers: self.1.into() }
     }
 }
 

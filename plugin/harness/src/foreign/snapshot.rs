@@ -33,6 +33,7 @@ use bevy::{
     window::WindowEvent,
 };
 use bevy_playbot::{
+    action::ActionValue,
     agent::{AgentOrder, Control},
     bot::HeldAction,
     engine::panics,
@@ -194,7 +195,7 @@ struct SavedGame {
     /// The last value of each part of the reward.
     rewards: Vec<Option<f32>>,
     /// The last decision, if decisions hold for several ticks.
-    held: Vec<Option<u32>>,
+    held: Vec<Option<ActionValue>>,
     devices: Option<VirtualDevices>,
     keys: Option<ButtonInput<KeyCode>>,
     letters: Option<ButtonInput<Key>>,
@@ -223,7 +224,7 @@ impl SnapshotTools for ForeignGame {
             state: kept_state(world, agent),
             others: others(world, agent),
             rewards: foreign.rewards().map(|part| part.last).collect(),
-            held: foreign.held().map(|held| *held).collect(),
+            held: foreign.held().map(|held| held.clone()).collect(),
             devices: world.get_resource().cloned(),
             keys: world.get_resource().cloned(),
             letters: world.get_resource().cloned(),
@@ -254,7 +255,7 @@ impl SnapshotTools for ForeignGame {
         world.flush();
         cell.lock().rewards().zip(&saved.rewards).for_each(|(part, last)| part.last = *last);
         for (held, last) in cell.lock().held().zip(&saved.held) {
-            *held = *last;
+            held.clone_from(last);
         }
         put_state(world, agent, &saved.state);
         for (other, kept) in &saved.others {

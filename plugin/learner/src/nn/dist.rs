@@ -1,7 +1,7 @@
 //! Distributions over actions (and over latents), as pure functions of tensors.
 
 use crate::{
-    Actions, LearnError,
+    ActionSpace, Actions, Choices, LearnError, MixedSpace,
     device::{read, send},
     nn::params::{host, matrix},
 };
@@ -36,6 +36,9 @@ pub enum Dist {
         /// Logarithm of the standard deviation, `[n, dim]`, or `[1, dim]` for all rows alike.
         log_std: Tensor<2>,
     },
+    /// Independent parts: a categorical distribution for each of several choices, and a Gaussian for the vector, if
+    /// there is one. Log-probabilities, entropies and divergences are the sums over the parts.
+    Joint(Vec<Self>),
 }
 
 /// A batch of actions on a device, one per row.
@@ -45,18 +48,33 @@ pub enum ActionBatch {
     Discrete(Tensor<2, Int>),
     /// Vectors, `[n, dim]`.
     Continuous(Tensor<2>),
+    /// The parts of each action, in the order of [`Dist::Joint`].
+    Joint(Vec<Self>),
 }
 
 impl ActionBatch {
     /// Moves `actions` to `device`.
     pub fn new(actions: &Actions, device: &Device) -> Self {
         let n = actions.len();
+        let indices = |of: Vec<i64>| Self::Discrete(send(TensorData::new(of, [n, 1]), device));
         match actions {
-            Actions::Discrete(values) => {
-                let values: Vec<i64> = values.iter().map(|&a| i64::from(a)).collect();
-                Self::Discrete(send(TensorData::new(values, [n, 1]), device))
-            }
+            Actions::Discrete(values) => indices(values.iter().map(|&a| i64::from(a)).collect()),
             Actions::Continuous { dim, values } => Self::Continuous(matrix(values.clone(), n, *dim, device)),
+            Actions::Mixed { choices, options, dim, values } => {
+                let choice =
+                    |at: usize| indices(options.iter().skip(at).step_by(*choices).map(|&a| i64::from(a)).collect());
+                let vector = (*dim > 0).then(|| Self::Continuous(matrix(values.clone(), n, *dim, device)));
+                Self::Joint((0..*choices).map(choice).chain(vector).collect())
+            }
+        }
+    }
+
+    /// Returns some of the rows, which may repeat.
+    pub(crate) fn select(&self, rows: &Tensor<1, Int>) -> Self {
+        match self {
+            Self::Discrete(actions) => Self::Discrete(actions.clone().select(0, rows.clone())),
+            Self::Continuous(actions) => Self::Continuous(actions.clone().select(0, rows.clone())),
+            Self::Joint(parts) => Self::Joint(parts.iter().map(|part| part.select(rows)).collect()),
         }
     }
 
@@ -71,6 +89,23 @@ impl ActionBatch {
                 Actions::Discrete(numbers.map_err(|e| LearnError::Device(e.to_string()))?)
             }
             Self::Continuous(action) => Actions::Continuous { dim: action.dims()[1], values: host(action.clone())? },
+            Self::Joint(parts) => {
+                let parts = parts.iter().map(Self::to_host).collect::<Result<Vec<_>, _>>()?;
+                let mut taken: Vec<Vec<u32>> = Vec::new();
+                let (mut dim, mut values) = (0, Vec::new());
+                for part in parts {
+                    match part {
+                        Actions::Discrete(indices) => taken.push(indices),
+                        Actions::Continuous { dim: width, values: numbers } => (dim, values) = (width, numbers),
+                        Actions::Mixed { .. } => {
+                            return Err(LearnError::Action("a part of an action has parts".to_owned()));
+                        }
+                    }
+                }
+                let rows = taken.first().map_or(0, Vec::len);
+                let options = (0..rows).flat_map(|row| taken.iter().map(move |indices| indices[row])).collect();
+                Actions::Mixed { choices: taken.len(), options, dim, values }
+            }
         })
     }
 }
@@ -96,6 +131,9 @@ impl Dist {
                 let terms = score.square() * 0.5 + log_std.clone() + HALF_LN_TAU;
                 Ok(terms.sum_dim(1).squeeze_dim(1).neg())
             }
+            (Self::Joint(parts), ActionBatch::Joint(actions)) if parts.len() == actions.len() => {
+                sum_of(parts.iter().zip(actions).map(|(part, action)| part.log_prob(action)))
+            }
             _ => Err(LearnError::Action("distribution and actions differ in kind".to_owned())),
         }
     }
@@ -109,6 +147,10 @@ impl Dist {
                 terms.sum_dim(1).squeeze_dim(1).neg()
             }
             Self::Gaussian { log_std, .. } => (log_std.clone() + (0.5 + HALF_LN_TAU)).sum_dim(1).squeeze_dim(1),
+            Self::Joint(parts) => {
+                let parts = parts.iter().map(Self::entropy);
+                parts.reduce(|sum, part| sum + part).expect("there is a part, or there would be no action")
+            }
         }
     }
 
@@ -131,7 +173,29 @@ impl Dist {
                 let terms = (ratio + distance - 1.0) * 0.5 + (lq.clone() - lp.clone());
                 Ok(terms.sum_dim(1).squeeze_dim(1))
             }
+            (Self::Joint(these), Self::Joint(others)) if these.len() == others.len() => {
+                sum_of(these.iter().zip(others).map(|(this, other)| this.kl(other)))
+            }
             _ => Err(LearnError::Action("the distributions differ in kind".to_owned())),
+        }
+    }
+
+    /// Returns the distributions with these numbers `[n, options]` added to the logarithms of all choices, whose
+    /// probabilities then add up to 1 again.
+    #[must_use]
+    pub(crate) fn with_offsets(self, offsets: &Tensor<2>) -> Self {
+        let mut first = 0;
+        let mut shifted = |part| match part {
+            Self::Categorical { log_probs } => {
+                let [_, options] = log_probs.dims();
+                first += options;
+                Self::categorical(log_probs + offsets.clone().narrow(1, first - options, options))
+            }
+            other => other,
+        };
+        match self {
+            Self::Joint(parts) => Self::Joint(parts.into_iter().map(shifted).collect()),
+            one => shifted(one),
         }
     }
 
@@ -141,6 +205,7 @@ impl Dist {
         match self {
             Self::Categorical { log_probs } => Self::Categorical { log_probs: log_probs.detach() },
             Self::Gaussian { mean, log_std } => Self::Gaussian { mean: mean.detach(), log_std: log_std.detach() },
+            Self::Joint(parts) => Self::Joint(parts.into_iter().map(Self::detach).collect()),
         }
     }
 
@@ -150,6 +215,7 @@ impl Dist {
         match self {
             Self::Categorical { log_probs } => Self::Categorical { log_probs: of(log_probs) },
             Self::Gaussian { mean, log_std } => Self::Gaussian { mean: of(mean), log_std: of(log_std) },
+            Self::Joint(parts) => Self::Joint(parts.iter().map(|part| part.select(rows)).collect()),
         }
     }
 
@@ -160,8 +226,9 @@ impl Dist {
     pub fn to_host(self) -> Result<HostDist, LearnError> {
         match self {
             Self::Categorical { log_probs } => {
-                let [_, dim] = log_probs.dims();
-                Ok(HostDist { dim, head: host(log_probs.inner())?, log_std: None })
+                let [_, choices] = log_probs.dims();
+                let space = ActionSpace::Discrete(choices);
+                Ok(HostDist { space, head: host(log_probs.inner())?, log_std: None })
             }
             Self::Gaussian { mean, log_std } => {
                 let [n, dim] = mean.dims();
@@ -169,39 +236,80 @@ impl Dist {
                 if stds.len() == dim {
                     stds = stds.repeat(n);
                 }
-                Ok(HostDist { dim, head: host(mean.inner())?, log_std: Some(stds) })
+                Ok(HostDist { space: ActionSpace::Continuous(dim), head: host(mean.inner())?, log_std: Some(stds) })
             }
+            Self::Joint(parts) => joined(parts.into_iter().map(Self::to_host).collect::<Result<Vec<_>, _>>()?),
         }
     }
+}
+
+/// Returns the sum of numbers per row.
+fn sum_of(parts: impl Iterator<Item = Result<Tensor<1>, LearnError>>) -> Result<Tensor<1>, LearnError> {
+    let sum = parts.reduce(|sum, part| Ok(sum? + part?));
+    sum.unwrap_or_else(|| Err(LearnError::Action("a distribution without parts".to_owned())))
+}
+
+/// Puts the columns of parts side by side.
+fn joined(parts: Vec<HostDist>) -> Result<HostDist, LearnError> {
+    let sizes: Vec<usize> = parts.iter().map(|part| part.space.options()).filter(|&size| size > 0).collect();
+    let numbers = parts.iter().map(|part| part.space.numbers()).sum();
+    let space = ActionSpace::Mixed(MixedSpace { choices: Choices::new(&sizes)?, numbers });
+    let rows = parts.first().map_or(0, |part| part.head.len() / part.space.dim().max(1));
+    let mut head = Vec::with_capacity(rows * space.dim());
+    for row in 0..rows {
+        for part in &parts {
+            let dim = part.space.dim();
+            head.extend_from_slice(&part.head[row * dim..(row + 1) * dim]);
+        }
+    }
+    Ok(HostDist { space, head, log_std: parts.into_iter().find_map(|part| part.log_std) })
 }
 
 /// A batch of distributions in host memory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HostDist {
-    /// Choices, or dimensions.
-    pub dim: usize,
-    /// Log-probabilities or means, `n * dim`.
+    /// The space of the actions.
+    pub space: ActionSpace,
+    /// Log-probabilities or means, `n * dim`. In a mixed space those of each choice, and then the means.
     pub head: Vec<f32>,
-    /// Logarithms of the standard deviations, `n * dim`; `None` if categorical.
+    /// Logarithms of the standard deviations, `n * numbers`; `None` without a vector.
     pub log_std: Option<Vec<f32>>,
 }
 
 impl HostDist {
+    /// Returns the columns of the head: choices, or dimensions.
+    pub fn dim(&self) -> usize {
+        self.space.dim()
+    }
+
     /// Returns the distributions of `rows` as constants on `device`.
     pub fn rows(&self, rows: &[usize], device: &Device) -> Dist {
-        let gather = |values: &[f32]| {
-            let mut out = vec![0.0; rows.len() * self.dim];
+        let dim = self.dim();
+        let gather = |values: &[f32], dim: usize| {
+            let mut out = vec![0.0; rows.len() * dim];
             let products = out.len() * OF_A_MOVE;
-            share(&mut out, ROWS * self.dim, products, |piece, to| {
-                for (to, &row) in to.chunks_exact_mut(self.dim).zip(&rows[piece * ROWS..]) {
-                    to.copy_from_slice(&values[row * self.dim..(row + 1) * self.dim]);
+            share(&mut out, ROWS * dim, products, |piece, to| {
+                for (to, &row) in to.chunks_exact_mut(dim).zip(&rows[piece * ROWS..]) {
+                    to.copy_from_slice(&values[row * dim..(row + 1) * dim]);
                 }
             });
-            matrix(out, rows.len(), self.dim, device)
+            matrix(out, rows.len(), dim, device)
         };
-        match &self.log_std {
-            None => Dist::Categorical { log_probs: gather(&self.head) },
-            Some(stds) => Dist::Gaussian { mean: gather(&self.head), log_std: gather(stds) },
+        let stds = || gather(self.log_std.as_deref().unwrap_or_default(), self.space.numbers());
+        let head = gather(&self.head, dim);
+        match self.space {
+            ActionSpace::Discrete(_) => Dist::Categorical { log_probs: head },
+            ActionSpace::Continuous(_) => Dist::Gaussian { mean: head, log_std: stds() },
+            ActionSpace::Mixed(MixedSpace { choices, numbers }) => {
+                let choice =
+                    |at: Range<usize>| Dist::Categorical { log_probs: head.clone().narrow(1, at.start, at.len()) };
+                let mut parts: Vec<Dist> = choices.ranges().map(choice).collect();
+                if numbers > 0 {
+                    let mean = head.clone().narrow(1, choices.options(), numbers);
+                    parts.push(Dist::Gaussian { mean, log_std: stds() });
+                }
+                Dist::Joint(parts)
+            }
         }
     }
 }
@@ -258,20 +366,41 @@ impl<'a> CategoricalRows<'a> {
         rows: Range<usize>,
         from_these: bool,
     ) -> Self {
-        let choices = these.dim;
+        Self::of_options(these, &actions[rows.clone()], other, rows, from_these)
+    }
+
+    /// Does [`Self::new`] with the options of these rows alone, of which a row may have several.
+    fn of_options(
+        these: &'a HostDist,
+        actions: &'a [u32],
+        other: Option<&'a HostDist>,
+        rows: Range<usize>,
+        from_these: bool,
+    ) -> Self {
+        let choices = these.dim();
         let log_probs = |dist: &'a HostDist| &dist.head[rows.start * choices..rows.end * choices];
         let other = other.map(log_probs).map(|log_probs| OtherChoices {
             log_probs,
             probs: if from_these { Vec::new() } else { exp_of(log_probs) },
         });
         let log_probs = log_probs(these);
-        Self { choices, log_probs, probs: exp_of(log_probs), actions: &actions[rows], other, from_these }
+        Self { choices, log_probs, probs: exp_of(log_probs), actions, other, from_these }
     }
 }
 
 impl DistRows for CategoricalRows<'_> {
     fn terms(&self, row: usize) -> RowTerms {
-        let at = row * self.choices..(row + 1) * self.choices;
+        self.terms_at(row * self.choices..(row + 1) * self.choices, self.actions[row])
+    }
+
+    fn gradient(&self, row: usize, by: RowTerms, head: &mut [f32], _: &mut [f32]) {
+        self.gradient_at(row * self.choices..(row + 1) * self.choices, self.actions[row], by, head);
+    }
+}
+
+impl CategoricalRows<'_> {
+    /// Returns the terms of the choice whose log-probabilities lie at `at`.
+    fn terms_at(&self, at: Range<usize>, action: u32) -> RowTerms {
         let (l, p) = (&self.log_probs[at.clone()], &self.probs[at.clone()]);
         let kl = self.other.as_ref().map_or(0.0, |other| {
             let weights = if self.from_these { p } else { &other.probs[at.clone()] };
@@ -279,16 +408,16 @@ impl DistRows for CategoricalRows<'_> {
             weights.iter().zip(l).zip(&other.log_probs[at]).map(|((w, l), o)| sign * w * (l - o)).sum()
         });
         let entropy = -p.iter().zip(l).map(|(p, l)| p * l).sum::<f32>();
-        RowTerms { log_prob: l[self.actions[row] as usize], entropy, kl }
+        RowTerms { log_prob: l[action as usize], entropy, kl }
     }
 
-    fn gradient(&self, row: usize, by: RowTerms, head: &mut [f32], _: &mut [f32]) {
-        let at = row * self.choices..(row + 1) * self.choices;
+    /// Writes the derivatives by the log-probabilities at `at` into `head`.
+    fn gradient_at(&self, at: Range<usize>, action: u32, by: RowTerms, head: &mut [f32]) {
         let (l, p) = (&self.log_probs[at.clone()], &self.probs[at.clone()]);
         for ((to, p), l) in head.iter_mut().zip(p).zip(l) {
             *to = -by.entropy * p * (l + 1.0);
         }
-        head[self.actions[row] as usize] += by.log_prob;
+        head[action as usize] += by.log_prob;
         match &self.other {
             Some(other) if self.from_these => {
                 for (((to, p), l), o) in head.iter_mut().zip(p).zip(l).zip(&other.log_probs[at]) {
@@ -305,11 +434,13 @@ impl DistRows for CategoricalRows<'_> {
 #[derive(Debug)]
 pub(crate) struct GaussianRows<'a> {
     dim: usize,
-    /// Means and ln σ, `[n, dim]` each.
+    /// Columns of the head, and the first one that is a mean.
+    columns: (usize, usize),
+    /// The head, `[n, columns]`, and ln σ, `[n, dim]`.
     these: (&'a [f32], &'a [f32]),
     /// `[n, dim]`.
     actions: &'a [f32],
-    /// Means and ln σ of the compared distribution, as `these`.
+    /// Head and ln σ of the compared distribution, as `these`.
     other: Option<(&'a [f32], &'a [f32])>,
     /// True if the divergence is KL(these ‖ other), and not KL(other ‖ these).
     from_these: bool,
@@ -327,19 +458,22 @@ impl<'a> GaussianRows<'a> {
         rows: Range<usize>,
         from_these: bool,
     ) -> Self {
-        let dim = these.dim;
-        let at = rows.start * dim..rows.end * dim;
+        let dim = these.space.numbers();
+        let columns = (these.dim(), these.space.options());
+        let at = |width: usize| rows.start * width..rows.end * width;
         let numbers = |dist: &'a HostDist| {
-            (&dist.head[at.clone()], dist.log_std.as_deref().map_or(&[][..], |stds| &stds[at.clone()]))
+            (&dist.head[at(columns.0)], dist.log_std.as_deref().map_or(&[][..], |stds| &stds[at(dim)]))
         };
-        Self { dim, these: numbers(these), actions: &actions[at.clone()], other: other.map(numbers), from_these }
+        let actions = &actions[at(dim)];
+        Self { dim, columns, these: numbers(these), actions, other: other.map(numbers), from_these }
     }
 
     /// Returns the numbers of each dimension of a row: mean, ln σ and action, and the other's mean and ln σ.
     fn dims(&self, row: usize) -> impl Iterator<Item = ([f32; 3], Option<[f32; 2]>)> {
-        (row * self.dim..(row + 1) * self.dim).map(|at| {
-            let other = self.other.map(|(means, stds)| [means[at], stds[at]]);
-            ([self.these.0[at], self.these.1[at], self.actions[at]], other)
+        let mean = row * self.columns.0 + self.columns.1;
+        (row * self.dim..(row + 1) * self.dim).zip(mean..).map(|(at, mean)| {
+            let other = self.other.map(|(means, stds)| [means[mean], stds[at]]);
+            ([self.these.0[mean], self.these.1[at], self.actions[at]], other)
         })
     }
 }
@@ -379,6 +513,67 @@ impl DistRows for GaussianRows<'_> {
                 }
                 None => {}
             }
+        }
+    }
+}
+
+/// Several choices and a vector, each drawn by itself.
+#[derive(Debug)]
+pub(crate) struct JointRows<'a> {
+    choices: Choices,
+    /// Columns of the head.
+    dim: usize,
+    /// The head, of which only the columns of the choices are read.
+    all: CategoricalRows<'a>,
+    vector: Option<GaussianRows<'a>>,
+}
+
+impl<'a> JointRows<'a> {
+    /// Creates the rows as [`CategoricalRows::new`] does, from the options and the numbers of the actions.
+    pub(crate) fn new(
+        these: &'a HostDist,
+        (options, values): (&'a [u32], &'a [f32]),
+        other: Option<&'a HostDist>,
+        rows: Range<usize>,
+        from_these: bool,
+    ) -> Self {
+        let (choices, dim) = (these.space.choices(), these.dim());
+        let count = choices.sizes().len();
+        let vector =
+            (these.space.numbers() > 0).then(|| GaussianRows::new(these, values, other, rows.clone(), from_these));
+        let options = &options[rows.start * count..rows.end * count];
+        let all = CategoricalRows::of_options(these, options, other, rows, from_these);
+        Self { choices, dim, all, vector }
+    }
+
+    /// Returns the columns of each choice of a row within the row, and the option taken.
+    fn taken(&self, row: usize) -> impl Iterator<Item = (Range<usize>, u32)> {
+        let count = self.choices.sizes().len();
+        self.choices.ranges().zip(self.all.actions[row * count..].iter().copied())
+    }
+}
+
+impl DistRows for JointRows<'_> {
+    fn terms(&self, row: usize) -> RowTerms {
+        let first = row * self.dim;
+        let mut sum = self.vector.as_ref().map_or_else(RowTerms::default, |vector| vector.terms(row));
+        for (at, option) in self.taken(row) {
+            let terms = self.all.terms_at(first + at.start..first + at.end, option);
+            sum.log_prob += terms.log_prob;
+            sum.entropy += terms.entropy;
+            sum.kl += terms.kl;
+        }
+        sum
+    }
+
+    fn gradient(&self, row: usize, by: RowTerms, head: &mut [f32], log_std: &mut [f32]) {
+        let first = row * self.dim;
+        for (at, option) in self.taken(row) {
+            let to = &mut head[at.clone()];
+            self.all.gradient_at(first + at.start..first + at.end, option, by, to);
+        }
+        if let Some(vector) = &self.vector {
+            vector.gradient(row, by, &mut head[self.choices.options()..], log_std);
         }
     }
 }

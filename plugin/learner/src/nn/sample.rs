@@ -1,6 +1,7 @@
 //! Sampling of actions from plain numbers, row by row.
 
 use crate::{
+    ActionSpace,
     nn::HostDist,
     rng::{normal, unit},
 };
@@ -170,11 +171,11 @@ const EDGE: f64 = 0.999;
 /// The inverse image is not normal, so this is an approximation. The inverse of tanh is monotone and maps quantiles to
 /// quantiles. The median m goes to atanh(m). σ goes to half the distance of the images of m ± σ, with m and m ± σ
 /// clamped to ±0.999. For small σ this is the tangent's σ / (1 - m²). Near the edges, where that explodes, it stays a
-/// width that a policy can have. Categorical distributions are unchanged.
+/// width that a policy can have. Categorical distributions are unchanged, and so are several choices at once.
 pub fn unsquashed(decoder: &HostDist) -> HostDist {
-    let Some(stds) = &decoder.log_std else { return decoder.clone() };
+    let (Some(stds), ActionSpace::Continuous(_)) = (&decoder.log_std, decoder.space) else { return decoder.clone() };
     let before = |action: f64| libm::atanh(action.clamp(-EDGE, EDGE));
-    let mut out = HostDist { dim: decoder.dim, head: Vec::new(), log_std: None };
+    let mut out = HostDist { space: decoder.space, head: Vec::new(), log_std: None };
     let mut log_std = Vec::with_capacity(stds.len());
     for (&mean, &log) in decoder.head.iter().zip(stds) {
         let mean = f64::from(mean).clamp(-EDGE, EDGE);
@@ -229,7 +230,7 @@ mod tests {
     }
 
     fn of(mean: f32, std: f32) -> (f32, f32) {
-        let decoder = HostDist { dim: 1, head: vec![mean], log_std: Some(vec![std.ln()]) };
+        let decoder = HostDist { space: ActionSpace::Continuous(1), head: vec![mean], log_std: Some(vec![std.ln()]) };
         let mapped = unsquashed(&decoder);
         (mapped.head[0], mapped.log_std.expect("continuous")[0].exp())
     }
@@ -262,7 +263,7 @@ mod tests {
 
     #[test]
     fn choices_are_left_alone() {
-        let choices = HostDist { dim: 2, head: vec![-0.5, -0.9], log_std: None };
+        let choices = HostDist { space: ActionSpace::Discrete(2), head: vec![-0.5, -0.9], log_std: None };
         assert_eq!(unsquashed(&choices), choices);
     }
 }

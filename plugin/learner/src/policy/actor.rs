@@ -1,7 +1,7 @@
 //! The network of a distribution over actions.
 
 use crate::{
-    ActionSpace, FileError, LearnError, ObsKind, PolicySpec,
+    ActionSpace, FileError, LearnError, MixedSpace, ObsKind, PolicySpec,
     file::TensorFile,
     nn::{
         CnnKind, Dist, ImageNet, Init, Linear, Mlp, ObsBatch, ParamSource, ParamVisitor, Parameters, RandomInit,
@@ -17,6 +17,7 @@ use burn::tensor::{Device, Tensor};
 use playbot_kernels::elementwise::Activation;
 use rand::Rng;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 /// Name of the memory, behind the name of its actor.
 const MEMORY: &str = "memory";
@@ -67,6 +68,8 @@ pub struct Actor {
     pub net: Mlp,
     /// ln σ, for continuous actions.
     pub log_std: LogStd,
+    /// The actions that its head describes.
+    pub space: ActionSpace,
 }
 
 impl Actor {
@@ -107,18 +110,15 @@ impl Actor {
         let (inputs, dim) = (shape.inputs(), space.dim());
         let net = Mlp::build(source, prefix, inputs, &shape.hidden, dim, shape.activation, 0.01)?;
         let name = path(prefix, "log_std");
-        let mut layer = || Linear::build(source, &name, shape.hidden.last().copied().unwrap_or(inputs), dim, 0.01);
-        let log_std = match (space, std) {
-            (ActionSpace::Discrete(_), _) => LogStd::None,
-            (ActionSpace::Continuous(_), StdShape::State) => LogStd::State(layer()?),
-            (ActionSpace::Continuous(_), StdShape::Squashed(low, high)) => {
-                LogStd::Squashed { layer: layer()?, range: (low, high) }
-            }
-            (ActionSpace::Continuous(_), StdShape::Vector) => {
-                LogStd::Vector(source.param(&name, [dim], Init::Zeros)?)
-            }
+        let numbers = space.numbers();
+        let mut layer = || Linear::build(source, &name, shape.hidden.last().copied().unwrap_or(inputs), numbers, 0.01);
+        let log_std = match std {
+            _ if numbers == 0 => LogStd::None,
+            StdShape::State => LogStd::State(layer()?),
+            StdShape::Squashed(low, high) => LogStd::Squashed { layer: layer()?, range: (low, high) },
+            StdShape::Vector => LogStd::Vector(source.param(&name, [numbers], Init::Zeros)?),
         };
-        Ok(Self { cnn: None, memory: None, net, log_std })
+        Ok(Self { cnn: None, memory: None, net, log_std, space })
     }
 
     /// Adds a memory, behind skills of width `latent`, that has no effect on the outputs yet.
@@ -196,7 +196,7 @@ impl Actor {
         self.forward_legal(x, None)
     }
 
-    /// Does [`Self::forward`] with numbers that are added to the logits, `[n, choices]`, if there are any: 0 for legal
+    /// Does [`Self::forward`] with numbers that are added to the logits, `[n, options]`, if there are any: 0 for legal
     /// choices, and for illegal ones a negative number so large that their probability is 0.
     pub fn forward_legal(&self, x: Tensor<2>, logit_offsets: Option<&Tensor<2>>) -> Dist {
         self.head(self.net.features(x), logit_offsets)
@@ -210,11 +210,27 @@ impl Actor {
 
     fn head(&self, features: Tensor<2>, logit_offsets: Option<&Tensor<2>>) -> Dist {
         let head = self.net.head.forward(features.clone());
+        match self.space {
+            ActionSpace::Discrete(_) => categorical(head, logit_offsets.cloned()),
+            ActionSpace::Continuous(_) => self.gaussian(head, features),
+            ActionSpace::Mixed(MixedSpace { choices, numbers }) => {
+                let columns = |of: &Tensor<2>, at: &Range<usize>| of.clone().narrow(1, at.start, at.len());
+                let choice = |at| categorical(columns(&head, &at), logit_offsets.map(|offsets| columns(offsets, &at)));
+                let mut parts: Vec<Dist> = choices.ranges().map(choice).collect();
+                if numbers > 0 {
+                    let options = choices.options();
+                    parts.push(self.gaussian(columns(&head, &(options..options + numbers)), features));
+                }
+                Dist::Joint(parts)
+            }
+        }
+    }
+
+    /// Returns the normal distributions with these means.
+    fn gaussian(&self, head: Tensor<2>, features: Tensor<2>) -> Dist {
         match &self.log_std {
-            LogStd::None => Dist::categorical(match logit_offsets {
-                Some(offsets) => head + offsets.clone(),
-                None => head,
-            }),
+            // Where there are numbers there is ln σ.
+            LogStd::None => Dist::Gaussian { log_std: head.zeros_like(), mean: head },
             LogStd::Vector(log_std) => Dist::Gaussian { mean: head, log_std: log_std.clone().unsqueeze() },
             LogStd::State(layer) => {
                 let (low, high) = LOG_STD_RANGE;
@@ -225,6 +241,14 @@ impl Actor {
             }
         }
     }
+}
+
+/// Returns the choices of these logits, with numbers that are added to them.
+fn categorical(logits: Tensor<2>, offsets: Option<Tensor<2>>) -> Dist {
+    Dist::categorical(match offsets {
+        Some(offsets) => logits + offsets,
+        None => logits,
+    })
 }
 
 impl Parameters for Actor {

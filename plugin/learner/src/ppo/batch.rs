@@ -1,7 +1,7 @@
 //! The data of an update: a rollout with its advantages, and its minibatches in host memory.
 
 use crate::{
-    Augmentation, ObsKind, ObsSlice, Observations, Rollout,
+    ActionSpace, Augmentation, ObsKind, ObsSlice, Observations, Rollout,
     legal::logit_offsets,
     nn::{ActionBatch, ImageNet, ObsBatch, vector},
     norm::ObsStats,
@@ -26,6 +26,8 @@ use std::{
 #[derive(Debug)]
 pub(super) struct Batch<'a> {
     pub(super) rollout: &'a Rollout,
+    /// The space of its actions.
+    pub(super) space: ActionSpace,
     pub(super) advantages: Vec<f32>,
     pub(super) returns: Vec<f32>,
     /// Returns of intrinsic rewards; empty without curiosity.
@@ -175,7 +177,7 @@ impl Batch<'_> {
             inputs,
             recall: None,
             left: (!rollout.left.is_empty()).then(|| vector(pick(&rollout.left), device)),
-            logit_offsets: logit_offsets(&rollout.legal, rows, rollout.choices(), device),
+            logit_offsets: logit_offsets(&rollout.legal, rows, &self.space, device),
             ppo: PpoBatch {
                 actions: ActionBatch::new(&rollout.actions.gather(rows), device),
                 old_log_probs: vector(pick(&rollout.log_probs), device),

@@ -115,7 +115,7 @@ impl LabelledSteps {
         let (before, rows) = (self.len(), more.len());
         self.obs.push(more.obs.as_slice())?;
         self.actions.extend_rows(&more.actions, 0, rows)?;
-        crate::legal::extend(&mut self.legal, before, &more.legal, rows, spec.action_space.dim());
+        crate::legal::extend(&mut self.legal, before, &more.legal, rows, spec.action_space.options());
         Ok(())
     }
 
@@ -133,6 +133,10 @@ impl LabelledSteps {
         match &self.actions {
             Actions::Discrete(indices) => file.put_u32("actions", indices),
             Actions::Continuous { values, .. } => file.put("actions", &[values.len()], values),
+            Actions::Mixed { options, values, .. } => {
+                file.put_u32("options", options);
+                file.put("numbers", &[values.len()], values);
+            }
         }
         if header.is_masked {
             file.put_flags("legal", &self.legal);
@@ -150,7 +154,7 @@ impl LabelledSteps {
         if header.spec != *spec {
             return Err(file.format(format!("its steps are of {:?}, and {spec:?} is needed", header.spec)));
         }
-        let (rows, dim) = (header.rows, spec.action_space.dim());
+        let (rows, space) = (header.rows, spec.action_space);
         let product = |of: &TensorFile, what: &str, width: usize| match rows {
             0 => Ok(0),
             rows => of.product(what, &[rows, width]),
@@ -161,13 +165,19 @@ impl LabelledSteps {
             ObsKind::Image(_) => Observations::Image(file.take_bytes("obs", &[numbers])?),
         };
         let mut actions = Actions::empty(&spec.action_space);
-        let of_actions = product(&file, "actions", dim)?;
+        let of_numbers = product(&file, "actions", space.numbers())?;
         match &mut actions {
             Actions::Discrete(indices) => *indices = file.take_u32("actions", rows)?,
-            Actions::Continuous { values, .. } => *values = file.take("actions", &[of_actions])?,
+            Actions::Continuous { values, .. } => *values = file.take("actions", &[of_numbers])?,
+            Actions::Mixed { choices, options, values, .. } => {
+                let of_choices = product(&file, "options", *choices)?;
+                *options = file.take_u32("options", of_choices)?;
+                *values = file.take("numbers", &[of_numbers])?;
+            }
         }
         spec.action_space.check(&actions).map_err(|error| file.learner(error))?;
-        let legal = if header.is_masked { file.take_flags("legal", of_actions)? } else { Vec::new() };
+        let of_mask = product(&file, "legal", space.options())?;
+        let legal = if header.is_masked { file.take_flags("legal", of_mask)? } else { Vec::new() };
         file.finish()?;
         Ok(Self { obs, actions, legal })
     }
@@ -231,7 +241,7 @@ impl PpoLearner {
             shuffle(&mut order, &mut rng);
             for rows in order.chunks(config.batch) {
                 let features = self.nets.actor.join(&inputs.input(rows, &device))?;
-                let offsets = logit_offsets(&steps.legal, rows, spec.action_space.dim(), &device);
+                let offsets = logit_offsets(&steps.legal, rows, &spec.action_space, &device);
                 let dist = self.nets.actor.forward_legal(features, offsets.as_ref());
                 let labels = ActionBatch::new(&steps.actions.gather(rows), &device);
                 let loss = dist.log_prob(&labels)?.neg().mean();

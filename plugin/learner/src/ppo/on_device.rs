@@ -66,7 +66,7 @@ impl<'a> SentRollout<'a> {
             order,
             states: States::send(batch, &all, device),
             left: (!rollout.left.is_empty()).then(|| column(&rollout.left)),
-            logit_offsets: logit_offsets(&rollout.legal, &all, rollout.choices(), device),
+            logit_offsets: logit_offsets(&rollout.legal, &all, &batch.space, device),
             ppo: PpoBatch {
                 actions: ActionBatch::new(&rollout.actions, device),
                 old_log_probs: column(&rollout.log_probs),
@@ -118,10 +118,7 @@ impl<'a> SentRollout<'a> {
             left: self.left.as_ref().map(column),
             logit_offsets: self.logit_offsets.as_ref().map(|offsets| offsets.clone().select(0, at.clone())),
             ppo: PpoBatch {
-                actions: match &self.ppo.actions {
-                    ActionBatch::Discrete(actions) => ActionBatch::Discrete(actions.clone().select(0, at.clone())),
-                    ActionBatch::Continuous(actions) => ActionBatch::Continuous(actions.clone().select(0, at.clone())),
-                },
+                actions: self.ppo.actions.select(at),
                 old_log_probs: column(&self.ppo.old_log_probs),
                 advantages,
                 old_values: column(&self.ppo.old_values),

@@ -4,8 +4,11 @@
 mod host_loss_tests;
 
 use crate::{
-    Actions, LearnError,
-    nn::{Adam, CategoricalRows, Dist, DistRows, GaussianRows, HostDist, NamedGrads, RowTerms, finite, host, scalar},
+    ActionSpace, Actions, LearnError,
+    nn::{
+        Adam, CategoricalRows, Dist, DistRows, GaussianRows, HostDist, JointRows, NamedGrads, RowTerms, finite, host,
+        scalar,
+    },
     policy::{NetInput, Recall},
     ppo::{
         PpoConfig, PpoNets, StepMetrics,
@@ -314,14 +317,40 @@ impl HostLoss {
     pub(super) fn tensor(self, dist: &Dist, values: Tensor<1>) -> Tensor<1> {
         let total = known_gradient(values, self.metrics.total_loss as f32, self.of_values);
         match dist {
-            Dist::Categorical { log_probs } => total + known_gradient(log_probs.clone(), 0.0, self.of_head),
-            Dist::Gaussian { mean, log_std } => {
-                let [rows, dim] = log_std.dims();
-                let of_log_std = if rows == 1 { column_sums(&self.of_log_std, dim) } else { self.of_log_std };
-                let of_mean = known_gradient(mean.clone(), 0.0, self.of_head);
-                total + of_mean + known_gradient(log_std.clone(), 0.0, of_log_std)
+            Dist::Joint(parts) => {
+                let all: usize = parts.iter().map(columns).sum();
+                let mut first = 0;
+                parts.iter().fold(total, |total, part| {
+                    let at = first..first + columns(part);
+                    first = at.end;
+                    let of_head = self.of_head.chunks_exact(all).flat_map(|row| &row[at.clone()]).copied().collect();
+                    with_gradient(total, part, of_head, self.of_log_std.clone())
+                })
             }
+            dist => with_gradient(total, dist, self.of_head, self.of_log_std),
         }
+    }
+}
+
+/// Returns the columns of the head that belong to a distribution.
+fn columns(dist: &Dist) -> usize {
+    match dist {
+        Dist::Categorical { log_probs: head } | Dist::Gaussian { mean: head, .. } => head.dims()[1],
+        Dist::Joint(parts) => parts.iter().map(columns).sum(),
+    }
+}
+
+/// Adds a distribution whose derivatives are known, to the end of the graph that leads to it.
+fn with_gradient(total: Tensor<1>, dist: &Dist, of_head: Vec<f32>, of_log_std: Vec<f32>) -> Tensor<1> {
+    match dist {
+        Dist::Categorical { log_probs } => total + known_gradient(log_probs.clone(), 0.0, of_head),
+        Dist::Gaussian { mean, log_std } => {
+            let [rows, dim] = log_std.dims();
+            let of_log_std = if rows == 1 { column_sums(&of_log_std, dim) } else { of_log_std };
+            total + known_gradient(mean.clone(), 0.0, of_head) + known_gradient(log_std.clone(), 0.0, of_log_std)
+        }
+        // Parts have no parts of their own.
+        Dist::Joint(_) => total,
     }
 }
 
@@ -361,20 +390,29 @@ impl<'a> Rows<'a> {
     fn loss(&self) -> Result<HostLoss, LearnError> {
         let from_these = self.moment.score.is_some_and(|score| score.kl_direction == KlDirection::PolicyDecoder);
         let (policy, decoder) = (&self.policy, self.decoder.as_ref());
-        match (&policy.log_std, &self.actions, decoder.map(|decoder| &decoder.log_std)) {
-            (None, Actions::Discrete(actions), None | Some(None)) => {
-                Ok(self.by_pieces(0, |rows| CategoricalRows::new(policy, actions, decoder, rows, from_these)))
+        let differ = || LearnError::Action("policy, decoder and actions differ in kind".to_owned());
+        if decoder.is_some_and(|decoder| decoder.space != policy.space) {
+            return Err(differ());
+        }
+        let stds = policy.space.numbers();
+        match (policy.space, &self.actions) {
+            (ActionSpace::Discrete(_), Actions::Discrete(actions)) => {
+                Ok(self.by_pieces(stds, |rows| CategoricalRows::new(policy, actions, decoder, rows, from_these)))
             }
-            (Some(_), Actions::Continuous { values, .. }, None | Some(Some(_))) => {
-                Ok(self.by_pieces(policy.dim, |rows| GaussianRows::new(policy, values, decoder, rows, from_these)))
+            (ActionSpace::Continuous(_), Actions::Continuous { values, .. }) => {
+                Ok(self.by_pieces(stds, |rows| GaussianRows::new(policy, values, decoder, rows, from_these)))
             }
-            _ => Err(LearnError::Action("policy, decoder and actions differ in kind".to_owned())),
+            (ActionSpace::Mixed(_), Actions::Mixed { options, values, .. }) => {
+                let actions = (&options[..], &values[..]);
+                Ok(self.by_pieces(stds, |rows| JointRows::new(policy, actions, decoder, rows, from_these)))
+            }
+            _ => Err(differ()),
         }
     }
 
     /// Computes the loss piece by piece; with `stds` derivatives by ln σ in each row.
     fn by_pieces<D: DistRows>(&self, stds: usize, dist_of: impl Fn(Range<usize>) -> D + Sync) -> HostLoss {
-        let (n, dim) = (self.values.len(), self.policy.dim);
+        let (n, dim) = (self.values.len(), self.policy.dim());
         let (mut of_head, mut of_log_std, mut of_values) = (vec![0.0; n * dim], vec![0.0; n * stds], vec![0.0; n]);
         let mut std_rows = of_log_std.chunks_mut((ROWS * stds).max(1));
         let pieces = of_head.chunks_mut(ROWS * dim).zip(of_values.chunks_mut(ROWS)).enumerate();
@@ -405,7 +443,7 @@ impl<'a> Rows<'a> {
     }
 
     fn compute(&self, dist: &impl DistRows, piece: &mut Piece<'_>) {
-        let (dim, stds) = (self.policy.dim, piece.of_log_std.len() / piece.rows.len());
+        let (dim, stds) = (self.policy.dim(), piece.of_log_std.len() / piece.rows.len());
         for (i, row) in piece.rows.clone().enumerate() {
             let terms = dist.terms(i);
             let by = self.add_policy_row(row, terms, &mut piece.sums);

@@ -117,8 +117,8 @@ impl SacLearner {
         let prior = base.prior_origin().map(|prior| (prior.forward(here.clone()), prior.forward(next.clone())));
         let column = |values: &[f32]| matrix(values.to_vec(), n, 1, &device);
         let left = (buffer.widths.clock > 0).then(|| (column(&buffer.left), column(&buffer.next_left)));
-        let choices = buffer.widths.legal;
-        let offsets = |legal: &[bool]| logit_offsets(legal, &all, choices, &device);
+        let space = base.spec.action_space;
+        let offsets = |legal: &[bool]| logit_offsets(legal, &all, &space, &device);
         let continues = all.iter().map(|&slot| buffer.continues(slot, self.config.time_limit)).collect();
         Ok(SacBatch {
             inputs: here,
@@ -129,7 +129,7 @@ impl SacLearner {
             next_inputs: next,
             teacher: teacher.map(|output| output.batch(&all, &device)),
             logit_offsets: offsets(&buffer.legal).zip(offsets(&buffer.next_legal)),
-            entropy_share: entropy_share(&buffer.legal, choices),
+            entropy_share: entropy_share(&buffer.legal, &space),
             prior,
             seen_by_target,
         })

@@ -226,6 +226,8 @@ impl ReplayBuffer {
         match &self.actions {
             Actions::Discrete(values) => file.put_u32(&path(prefix, "actions"), values),
             Actions::Continuous { dim, values } => file.put(&path(prefix, "actions"), &[n, *dim], values),
+            // `SacConfig::check_space` refuses them.
+            Actions::Mixed { .. } => {}
         }
         file.put(&path(prefix, "rewards"), &[n], &self.rewards);
         file.put_flags(&path(prefix, "terminated"), &self.terminated);
@@ -265,6 +267,7 @@ impl ReplayBuffer {
         match &mut self.actions {
             Actions::Discrete(values) => *values = file.take_u32(&path(prefix, "actions"), n)?,
             Actions::Continuous { dim, values } => *values = file.take(&path(prefix, "actions"), &[n, *dim])?,
+            Actions::Mixed { .. } => {}
         }
         self.rewards = file.take(&path(prefix, "rewards"), &[n])?;
         self.terminated = file.take_flags(&path(prefix, "terminated"), n)?;

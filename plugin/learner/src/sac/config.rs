@@ -144,7 +144,22 @@ impl SacConfig {
         Some(match space {
             ActionSpace::Continuous(dim) => -target_scale.unwrap_or(1.0) * dim as f64,
             ActionSpace::Discrete(choices) => target_scale.unwrap_or(0.89) * libm::log(choices as f64),
+            // `check_space` refuses them.
+            ActionSpace::Mixed(_) => return None,
         })
+    }
+
+    /// Checks that SAC can learn actions of `space`: one choice, or a vector.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] for several choices at once.
+    pub fn check_space(&self, space: ActionSpace) -> Result<(), LearnError> {
+        match space {
+            ActionSpace::Discrete(_) | ActionSpace::Continuous(_) => Ok(()),
+            ActionSpace::Mixed(_) => Err(LearnError::Config(format!(
+                "SAC and RLPD learn one choice or a vector, not {space}: choose the algorithm ppo, score-ppo or spirl"
+            ))),
+        }
     }
 }
 

@@ -84,6 +84,7 @@ impl Critics {
         let (inputs, outputs) = match shape.space {
             ActionSpace::Discrete(choices) => (shape.net.inputs(), choices),
             ActionSpace::Continuous(dim) => (shape.net.inputs().saturating_add(dim), 1),
+            ActionSpace::Mixed(mixed) => (shape.net.inputs().saturating_add(mixed.dim()), 1),
         };
         let mut nets = Vec::new();
         for i in 1..=shape.critics {
@@ -124,6 +125,8 @@ impl Critics {
                 let of_choices = self.of_choices(inputs).into_iter();
                 of_choices.map(|q| q.gather(1, index.clone()).squeeze_dim(1)).collect()
             }
+            // `SacConfig::check_space` refuses them.
+            ActionBatch::Joint(_) => Vec::new(),
         }
     }
 }

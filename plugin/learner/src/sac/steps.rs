@@ -249,7 +249,7 @@ pub(super) fn explorer(space: ActionSpace, inputs: usize, device: &Device) -> Ac
         bias: vector(vec![0.0; dim], device),
     };
     let log_std = match space {
-        ActionSpace::Discrete(_) => LogStd::None,
+        ActionSpace::Discrete(_) | ActionSpace::Mixed(_) => LogStd::None,
         ActionSpace::Continuous(_) => {
             // In the middle of the range, to which the zeros lead.
             let middle = libm::log(NEARLY_UNIFORM);
@@ -259,6 +259,7 @@ pub(super) fn explorer(space: ActionSpace, inputs: usize, device: &Device) -> Ac
     Actor {
         cnn: None,
         memory: None,
+        space,
         net: Mlp { layers: Vec::new(), head: zeros(), activation: Activation::Relu },
         log_std,
     }
@@ -316,6 +317,7 @@ mod tests {
             let bin = match output.sample(0, &mut rng).0 {
                 ActionValue::Discrete(choice) => choice as usize,
                 ActionValue::Continuous(vector) => ((vector[1] + 1.0) * 2.5) as usize,
+                ActionValue::Mixed { .. } => panic!("SAC makes one choice"),
             };
             counts[bin.min(4)] += 1;
         }

@@ -138,10 +138,10 @@ impl ScoreConfig {
     /// [`LearnError::Setting`] if it is a legacy form for the other kind of actions.
     pub fn check_space(&self, space: ActionSpace) -> Result<(), LearnError> {
         match (self.penalty, space) {
-            (PenaltyForm::LegacyD4rl, ActionSpace::Discrete(_)) => {
+            (PenaltyForm::LegacyD4rl, ActionSpace::Discrete(_) | ActionSpace::Mixed(_)) => {
                 Err(SettingError::new("score.penalty", "LegacyD4rl is for continuous actions only").into())
             }
-            (PenaltyForm::LegacyCoinrun, ActionSpace::Continuous(_)) => {
+            (PenaltyForm::LegacyCoinrun, ActionSpace::Continuous(_) | ActionSpace::Mixed(_)) => {
                 Err(SettingError::new("score.penalty", "LegacyCoinrun is for discrete actions only").into())
             }
             _ => Ok(()),

@@ -1,7 +1,7 @@
 //! The penalty for leaving the decoder, and the weight of each row: the decoder's confidence, α in the paper.
 
 use crate::{
-    Actions, LearnError, legacy,
+    ActionSpace, Actions, LearnError, MixedSpace, legacy,
     nn::{Dist, HostDist, argmax, categorical_at, categorical_log_prob, gaussian_log_prob, sample_gaussian},
     rng::unit,
     score::{ConfidenceKind, KlDirection, PenaltyForm, ScoreConfig},
@@ -68,17 +68,26 @@ pub fn penalty(config: &ScoreConfig, decoder: &Dist, policy: &Dist, weight: Tens
 
 /// Returns one action per row, drawn from the decoder.
 pub fn own_samples<R: Rng + ?Sized>(decoder: &HostDist, rng: &mut R) -> Actions {
-    let rows = decoder.head.chunks_exact(decoder.dim);
-    match &decoder.log_std {
-        None => {
+    let dim = decoder.dim();
+    let rows = decoder.head.chunks_exact(dim);
+    let stds = decoder.log_std.as_deref().unwrap_or_default();
+    match decoder.space {
+        ActionSpace::Discrete(_) => {
             let draws: Vec<f64> = rows.map(|_| unit(rng)).collect();
-            let of_row = |row: usize| categorical_at(row_of(&decoder.head, decoder.dim, row), draws[row]);
-            Actions::Discrete(by_row(draws.len(), decoder.dim, of_row))
+            let of_row = |row: usize| categorical_at(row_of(&decoder.head, dim, row), draws[row]);
+            Actions::Discrete(by_row(draws.len(), dim, of_row))
         }
-        Some(stds) => {
-            let stds = stds.chunks_exact(decoder.dim);
-            let values = rows.zip(stds).flat_map(|(m, s)| sample_gaussian(m, s, rng)).collect();
-            Actions::Continuous { dim: decoder.dim, values }
+        ActionSpace::Continuous(_) => {
+            let values = rows.zip(stds.chunks_exact(dim)).flat_map(|(m, s)| sample_gaussian(m, s, rng)).collect();
+            Actions::Continuous { dim, values }
+        }
+        ActionSpace::Mixed(MixedSpace { choices, numbers }) => {
+            let (mut options, mut values) = (Vec::new(), Vec::new());
+            for (row, head) in rows.enumerate() {
+                options.extend(choices.ranges().map(|at| categorical_at(&head[at], unit(rng))));
+                values.extend(sample_gaussian(&head[choices.options()..], row_of(stds, numbers, row), rng));
+            }
+            Actions::Mixed { choices: choices.sizes().len(), options, dim: numbers, values }
         }
     }
 }
@@ -110,38 +119,40 @@ pub fn penalty_weights<R: Rng + ?Sized>(
 /// Discrete: the decoder's probability of the action, which [`ConfidenceKind::BoundedDensity`] divides by the largest
 /// of the row. Continuous: exp(-½ · mean over dimensions of the squared z-score), in (0, 1]. For
 /// [`ConfidenceKind::Density`] the density, the product over dimensions. For [`ConfidenceKind::BoundedDensity`] the
-/// density relative to the mean's, exp(-½ · sum of the squared z-scores).
+/// density relative to the mean's, exp(-½ · sum of the squared z-scores). Several choices and a vector: the product of
+/// the confidences in each of them.
 ///
 /// # Errors
 /// [`LearnError::Action`] or [`LearnError::Shape`] if the actions do not fit the decoder.
 pub fn confidences(kind: ConfidenceKind, decoder: &HostDist, actions: &Actions) -> Result<Vec<f32>, LearnError> {
-    let (dim, kind) = (decoder.dim, kind.resolved(decoder.log_std.is_some()));
+    let (dim, kind, space) = (decoder.dim(), kind.resolved(decoder.log_std.is_some()), decoder.space);
     let n = decoder.head.len() / dim;
     if kind == ConfidenceKind::Off {
         return Ok(vec![1.0; n]);
     }
     LearnError::check("actions", n, actions.len())?;
-    match (&decoder.log_std, actions) {
-        (None, Actions::Discrete(actions)) => {
-            if actions.iter().any(|&a| a as usize >= dim) {
-                return Err(LearnError::Action(format!("one is not below {dim}")));
-            }
-            let log_prob = |logits: &[f32], a: u32| match kind {
-                ConfidenceKind::BoundedDensity => logits[a as usize] - logits[argmax(logits) as usize],
-                _ => categorical_log_prob(logits, a),
-            };
-            Ok(by_row(n, dim, |row| libm::expf(log_prob(row_of(&decoder.head, dim, row), actions[row]))))
+    space.check(actions)?;
+    let (choices, options, numbers) = (space.choices(), space.options(), space.numbers());
+    let of_choice = |log_probs: &[f32], option: u32| {
+        libm::expf(match kind {
+            ConfidenceKind::BoundedDensity => log_probs[option as usize] - log_probs[argmax(log_probs) as usize],
+            _ => categorical_log_prob(log_probs, option),
+        })
+    };
+    let of_vector = |mean: &[f32], log_std: &[f32], action: &[f32]| match kind {
+        ConfidenceKind::Density => libm::expf(gaussian_log_prob(mean, log_std, action)),
+        ConfidenceKind::BoundedDensity => libm::exp(-0.5 * square_sum(mean, log_std, action)) as f32,
+        _ => libm::exp(-0.5 * square_sum(mean, log_std, action) / numbers as f64) as f32,
+    };
+    Ok(by_row(n, dim, |row| {
+        let head = row_of(&decoder.head, dim, row);
+        let taken = choices.ranges().zip(actions.chosen(row));
+        let of_choices = taken.map(|(at, &option)| of_choice(&head[at], option)).product();
+        match &decoder.log_std {
+            Some(stds) => of_choices * of_vector(&head[options..], row_of(stds, numbers, row), actions.vector(row)),
+            None => of_choices,
         }
-        (Some(stds), Actions::Continuous { dim: width, values }) if *width == dim => Ok(by_row(n, dim, |row| {
-            let [mean, log_std, action] = [&decoder.head, stds, values].map(|all| row_of(all, dim, row));
-            match kind {
-                ConfidenceKind::Density => libm::expf(gaussian_log_prob(mean, log_std, action)),
-                ConfidenceKind::BoundedDensity => libm::exp(-0.5 * square_sum(mean, log_std, action)) as f32,
-                _ => libm::exp(-0.5 * square_sum(mean, log_std, action) / dim as f64) as f32,
-            }
-        })),
-        _ => Err(LearnError::Action("decoder and actions differ in kind".to_owned())),
-    }
+    }))
 }
 
 /// Returns Σ ((a - μ) / σ)².
@@ -164,7 +175,7 @@ mod tests {
     #[test]
     fn discrete_by_hand() {
         let head = [0.5f32, 0.2, 0.3].map(f32::ln);
-        let decoder = HostDist { dim: 3, head: [head, head].concat(), log_std: None };
+        let decoder = HostDist { space: ActionSpace::Discrete(3), head: [head, head].concat(), log_std: None };
         let actions = Actions::Discrete(vec![2, 0]);
         let confidence = |kind| confidences(kind, &decoder, &actions).expect("they fit");
         close(&confidence(ConfidenceKind::PolicyAction), &[0.3, 0.5]);
@@ -178,7 +189,7 @@ mod tests {
         // z-scores 1 and 2 in the first row, none in the second.
         let ln2 = std::f32::consts::LN_2;
         let log_std = Some(vec![0.0, ln2, 0.0, ln2]);
-        let decoder = HostDist { dim: 2, head: vec![0.0, 1.0, 0.0, 1.0], log_std };
+        let decoder = HostDist { space: ActionSpace::Continuous(2), head: vec![0.0, 1.0, 0.0, 1.0], log_std };
         let actions = Actions::Continuous { dim: 2, values: vec![1.0, -3.0, 0.0, 1.0] };
         let confidence = |kind| confidences(kind, &decoder, &actions).expect("they fit");
         close(&confidence(ConfidenceKind::PolicyAction), &[libm::exp(-1.25), 1.0]);
@@ -189,7 +200,8 @@ mod tests {
 
     #[test]
     fn by_default_a_gaussian_tells_actions_apart() {
-        let decoder = HostDist { dim: 1, head: vec![0.0, 0.0], log_std: Some(vec![0.0, 0.0]) };
+        let decoder =
+            HostDist { space: ActionSpace::Continuous(1), head: vec![0.0, 0.0], log_std: Some(vec![0.0, 0.0]) };
         let actions = Actions::Continuous { dim: 1, values: vec![0.0, 2.0] };
         let mut rng = Streams::new(1).stream("own", 0);
         let weights = penalty_weights(&ScoreConfig::default(), &decoder, &actions, &mut rng).expect("they fit");
@@ -201,7 +213,7 @@ mod tests {
 
     #[test]
     fn legacy_forms_have_their_own_weights() {
-        let decoder = HostDist { dim: 1, head: vec![0.0], log_std: Some(vec![0.0]) };
+        let decoder = HostDist { space: ActionSpace::Continuous(1), head: vec![0.0], log_std: Some(vec![0.0]) };
         let actions = Actions::Continuous { dim: 1, values: vec![0.0] };
         let config = |penalty| ScoreConfig { penalty, confidence: ConfidenceKind::Off, ..ScoreConfig::default() };
         let mut rng = Streams::new(1).stream("own", 0);

@@ -135,10 +135,10 @@ impl SkillConfig {
     /// [`LearnError::Setting`] if `skills.action_noise` is not 0 for continuous actions.
     pub fn check_space(&self, space: ActionSpace) -> Result<(), LearnError> {
         match space {
-            ActionSpace::Continuous(_) if self.action_noise > 0.0 => {
+            ActionSpace::Continuous(_) | ActionSpace::Mixed(_) if self.action_noise > 0.0 => {
                 let why = format!(
-                    "is the share of discrete actions that were replaced and must be 0 for continuous ones, not {}: \
-                     Gaussian noise on those becomes part of the decoder's standard deviation",
+                    "is the share of discrete actions that were replaced and must be 0 for {space}, not {}: the \
+                     noise on those becomes part of the decoder",
                     self.action_noise
                 );
                 Err(SettingError::new("skills.action_noise", why).into())
@@ -168,7 +168,7 @@ impl SkillConfig {
     }
 }
 
-/// The encoder's representation of a discrete action. Continuous ones are read unchanged.
+/// The encoder's representation of a discrete action, or of each of several choices. Numbers are read unchanged.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum ActionInput {
     /// One number per choice: 1 for the one taken, else 0.
@@ -183,6 +183,7 @@ impl ActionInput {
     pub fn width(self, space: ActionSpace) -> usize {
         match (self, space) {
             (Self::ScaledIndex, ActionSpace::Discrete(_)) => 1,
+            (Self::ScaledIndex, ActionSpace::Mixed(space)) => space.choices.sizes().len() + space.numbers,
             _ => space.dim(),
         }
     }
@@ -193,6 +194,7 @@ impl ActionInput {
     /// [`LearnError::Action`] names the first action that is not in `space`.
     pub fn encode(self, actions: &Actions, space: ActionSpace) -> Result<Vec<f32>, LearnError> {
         space.check(actions)?;
+        let scaled = |option: u32, size: usize| (f64::from(option) / size.saturating_sub(1).max(1) as f64) as f32;
         Ok(match (actions, self) {
             (Actions::Continuous { values, .. }, _) => values.clone(),
             (Actions::Discrete(values), Self::OneHot) => {
@@ -203,9 +205,22 @@ impl ActionInput {
                 }
                 out
             }
-            (Actions::Discrete(values), Self::ScaledIndex) => {
-                let last = space.dim().saturating_sub(1).max(1) as f64;
-                values.iter().map(|&a| (f64::from(a) / last) as f32).collect()
+            (Actions::Discrete(values), Self::ScaledIndex) => values.iter().map(|&a| scaled(a, space.dim())).collect(),
+            (Actions::Mixed { .. }, form) => {
+                let choices = space.choices();
+                let mut out = Vec::with_capacity(actions.len() * self.width(space));
+                for row in 0..actions.len() {
+                    for (at, &option) in choices.ranges().zip(actions.chosen(row)) {
+                        match form {
+                            Self::OneHot => {
+                                out.extend((0..at.len()).map(|i| f32::from(u8::from(i == option as usize))))
+                            }
+                            Self::ScaledIndex => out.push(scaled(option, at.len())),
+                        }
+                    }
+                    out.extend_from_slice(actions.vector(row));
+                }
+                out
             }
         })
     }

@@ -49,7 +49,7 @@ impl Dataset {
         episodes: Vec<DatasetEpisode>,
     ) -> Result<Self, LearnError> {
         let observation = observation.into();
-        if observation.numbers() == 0 || space.dim() == 0 {
+        if observation.numbers() == 0 || space.is_empty() {
             return Err(LearnError::Config("observations and actions must not be empty".to_owned()));
         }
         for (i, episode) in episodes.iter().enumerate() {
@@ -175,6 +175,10 @@ impl Dataset {
             let actions = match &episode.actions {
                 Actions::Discrete(choices) => fnv1a(bytemuck::cast_slice(choices)),
                 Actions::Continuous { values, .. } => fnv1a(bytemuck::cast_slice(values)),
+                Actions::Mixed { options, values, .. } => {
+                    let hashes = [fnv1a(bytemuck::cast_slice(options)), fnv1a(bytemuck::cast_slice(values))];
+                    fnv1a(bytemuck::cast_slice(&hashes))
+                }
             };
             hashes[0] = [observations, actions];
         });
@@ -204,7 +208,7 @@ impl Dataset {
         if self.legal.is_empty() {
             return Vec::new();
         }
-        let choices = self.space.dim();
+        let choices = self.space.options();
         let mut legal = Vec::with_capacity(windows.len() * steps * choices);
         for t in 0..steps {
             for window in windows {

@@ -56,22 +56,30 @@ pub struct SkillForward {
 }
 
 impl SkillForward {
-    /// Gives illegal actions probability 0. `legal` has an entry for each action of each step, time-major, or is empty
-    /// without masks. `actions` are those that were taken.
+    /// Gives illegal actions of `space` probability 0. `legal` has an entry for each option of each step, time-major, or
+    /// is empty without masks. `actions` are those that were taken.
     ///
     /// # Errors
     /// [`LearnError::Action`] if `actions` do not fit the decoder.
-    pub(super) fn restricted(self, legal: &[bool], actions: &ActionBatch, device: &Device) -> Result<Self, LearnError> {
-        let Dist::Categorical { log_probs } = &self.decoded else { return Ok(self) };
-        let [rows, choices] = log_probs.dims();
-        let rows: Vec<usize> = (0..rows).collect();
-        let Some(offsets) = logit_offsets(legal, &rows, choices, device) else { return Ok(self) };
-        let decoded = Dist::categorical(log_probs.clone() + offsets);
+    pub(super) fn restricted(
+        self,
+        legal: &[bool],
+        space: ActionSpace,
+        actions: &ActionBatch,
+        device: &Device,
+    ) -> Result<Self, LearnError> {
+        let (options, choices) = (space.options(), space.choices());
+        let Some(steps) = legal.len().checked_div(options) else { return Ok(self) };
+        let rows: Vec<usize> = (0..steps).collect();
+        let Some(offsets) = logit_offsets(legal, &rows, &space, device) else { return Ok(self) };
+        let decoded = self.decoded.clone().with_offsets(&offsets);
         let count = |mask: &[bool]| match mask.iter().filter(|&&is_legal| is_legal).count() {
-            0 => choices as f32,
+            0 => mask.len() as f32,
             count => count as f32,
         };
-        let counts = legal.chunks_exact(choices).map(count).collect();
+        // Of several choices, the number of legal actions is the product.
+        let actions_of = |mask: &[bool]| choices.ranges().map(|at| count(&mask[at])).product();
+        let counts = legal.chunks_exact(options).map(actions_of).collect();
         let nll_per_step = decoded.log_prob(actions)?.neg();
         Ok(Self { nll_per_step, decoded, legal_count: Some(vector(counts, device)), ..self })
     }

@@ -5,8 +5,8 @@ use crate::{
     device::update_on,
     file::{FileKind, TensorFile},
     nn::{
-        ActionBatch, Adam, AdamConfig, Dist, FlatGrads, NamedGrads, ObsBatch, argmax, check_loss, frozen, host, matrix,
-        scalar, tracked,
+        ActionBatch, Adam, AdamConfig, Dist, FlatGrads, HostDist, NamedGrads, ObsBatch, argmax, check_loss, frozen,
+        host, matrix, scalar, tracked,
     },
     norm::{ObsStats, put_obs_stats, take_obs_stats},
     observation::augmented,
@@ -293,7 +293,7 @@ impl SkillTrainer {
         let noise = matrix(noise, batch, self.config.latent, &device);
         let rows = ActionBatch::new(&actions, &device);
         let forward = self.nets.forward(&states, &rows, encoded, noise, steps)?;
-        Ok((forward.restricted(&dataset.legal_of(windows, steps), &rows, &device)?, actions))
+        Ok((forward.restricted(&dataset.legal_of(windows, steps), dataset.space, &rows, &device)?, actions))
     }
 
     /// Returns the squared error of the predicted state of `windows` of `dataset`, `[1]`, if it is predicted.
@@ -499,15 +499,20 @@ impl MetricSums {
     }
 }
 
-/// Returns the share of the actions that are the most likely ones; `None` for continuous actions.
+/// Returns the share of the choices that are the most likely ones; `None` for actions without choices.
 pub(super) fn accuracy(decoded: &Dist, actions: &Actions) -> Result<Option<f32>, LearnError> {
-    let (Dist::Categorical { log_probs }, Actions::Discrete(actions)) = (decoded, actions) else {
+    if matches!(decoded, Dist::Gaussian { .. }) {
         return Ok(None);
-    };
-    let [rows, dim] = log_probs.dims();
-    let log_probs = host(log_probs.clone().inner())?;
-    let hits = log_probs.chunks_exact(dim).zip(actions).filter(|(row, a)| argmax(row) == **a).count();
-    Ok(Some(hits as f32 / rows as f32))
+    }
+    let HostDist { space, head, .. } = decoded.clone().to_host()?;
+    let (mut hits, mut count) = (0, 0);
+    for (row, head) in head.chunks_exact(space.dim().max(1)).enumerate() {
+        for (at, &option) in space.choices().ranges().zip(actions.chosen(row)) {
+            hits += usize::from(argmax(&head[at]) == option);
+            count += 1;
+        }
+    }
+    Ok((count > 0).then(|| hits as f32 / count as f32))
 }
 
 // A trainer's complete state in one file.

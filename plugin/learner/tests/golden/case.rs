@@ -35,6 +35,11 @@ impl Case {
         Self::read(&fixtures("memory"), name)
     }
 
+    /// Creates a case of the script `tests/fixtures/action_spaces/generate.py`, which no other folder has.
+    pub fn of_action_spaces(name: &str) -> Self {
+        Self::read(&fixtures("action_spaces"), name)
+    }
+
     /// Creates a case of the script `tests/fixtures/curiosity/generate.py`, which no other folder has.
     pub fn of_curiosity(name: &str) -> Self {
         Self::read(&fixtures("curiosity"), name)

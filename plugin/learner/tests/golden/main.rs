@@ -2,11 +2,12 @@
 //! principles.
 //!
 //! The cases of PyTorch lie in `tests/fixtures/numerics`, or in the folder that the environment variable
-//! `PLAYBOT_GOLDEN` names; those of variants of SAC, of curiosity and of memory lie in `tests/fixtures/sac_variants`,
-//! `tests/fixtures/curiosity` and `tests/fixtures/memory`, beside the scripts that make them.
+//! `PLAYBOT_GOLDEN` names; those of variants of SAC, of curiosity, of memory and of action spaces lie in
+//! `tests/fixtures/sac_variants`, `curiosity`, `memory` and `action_spaces`, beside the scripts that make them.
 
 #![allow(clippy::disallowed_methods, reason = "tests compare with the system's functions")]
 
+mod action_spaces;
 mod adam;
 mod case;
 mod curiosity;

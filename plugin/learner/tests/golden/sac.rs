@@ -230,7 +230,7 @@ fn golden_sac_discrete_losses() {
         let device = kind.plain();
         let log_probs = |logits: Tensor<2>| match Dist::categorical(logits) {
             Dist::Categorical { log_probs } => log_probs,
-            Dist::Gaussian { .. } => panic!("categorical"),
+            Dist::Gaussian { .. } | Dist::Joint(_) => panic!("categorical"),
         };
         let log_alpha = leaf(case.tensor::<1>("param.log_alpha", &device));
         let alpha = number(log_alpha.clone().exp());

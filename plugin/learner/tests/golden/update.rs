@@ -36,6 +36,7 @@ impl<'a> Update<'a> {
         let space = match case.actions("in.actions") {
             Actions::Discrete(_) => ActionSpace::Discrete(case.dim("K")),
             Actions::Continuous { .. } => ActionSpace::Continuous(case.dim("A")),
+            Actions::Mixed { .. } => panic!("in `action_spaces`"),
         };
         let shape = NetShape {
             obs_dim: case.dim("obs"),
@@ -131,6 +132,7 @@ impl<'a> Update<'a> {
         let actions = |name: &str| match case.actions(name) {
             Actions::Discrete(all) => Actions::Discrete(rows.iter().map(|&r| all[r]).collect()),
             Actions::Continuous { dim, .. } => Actions::Continuous { dim, values: pick(name) },
+            Actions::Mixed { .. } => panic!("in `action_spaces`"),
         };
         let mut inputs = matrix(pick("in.obs"));
         if case.has("in.skill") {

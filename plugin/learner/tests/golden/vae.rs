@@ -132,6 +132,7 @@ impl<'a> Run<'a> {
                 let values = time_major(&self.case.f32s("in.actions"), self.batch, self.steps);
                 Actions::Continuous { dim, values }
             }
+            ActionSpace::Mixed(_) => panic!("no case has several choices"),
         }
     }
 

@@ -19,6 +19,7 @@ mod gpu;
 mod held_out;
 mod image_task;
 mod images;
+mod mixed;
 mod noisy;
 mod norm_obs;
 mod norm_obs_files;

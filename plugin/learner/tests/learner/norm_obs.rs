@@ -40,6 +40,7 @@ pub fn demos(space: ActionSpace) -> Dataset {
                 let values = wanted.flatten().map(|a| a + NOISE * normal(&mut rng)).collect();
                 Actions::Continuous { dim, values }
             }
+            ActionSpace::Mixed(_) => panic!("a choice or a vector"),
         };
         DatasetEpisode { observations: observations.into(), actions }
     });
@@ -154,6 +155,7 @@ pub fn rollout(learner: &impl Learner, space: ActionSpace, number: u64) -> Rollo
     let rewards = match &actions {
         Actions::Discrete(choices) => choices.iter().map(|&a| a as f32).collect(),
         Actions::Continuous { values, .. } => values.chunks_exact(2).map(|a| a[0]).collect(),
+        Actions::Mixed { .. } => panic!("a choice or a vector"),
     };
     let next_z = z[..envs * prior.latent()].to_vec();
     let ends = EndStates { next_obs: hall(envs, 200 + number).into(), next_z, ..EndStates::new(&ObsKind::Vector(OBS)) };

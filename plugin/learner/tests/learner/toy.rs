@@ -150,7 +150,7 @@ impl Driver {
         let rows = self.rngs.iter_mut().enumerate().map(|(row, rng)| output.sample(row, rng));
         rows.map(|(action, log_prob)| match action {
             ActionValue::Discrete(action) => (action, log_prob),
-            ActionValue::Continuous(_) => panic!("the corridor is discrete"),
+            ActionValue::Continuous(_) | ActionValue::Mixed { .. } => panic!("the corridor is discrete"),
         })
         .unzip()
     }

@@ -1,7 +1,7 @@
 //! The testers that are scored, the clocks of their jobs, and the detectors that they share.
 
 use bevy_playbot::{
-    action::{ActionSpace, ActionValue},
+    action::{ActionSpace, ActionValue, MixedSpace},
     bot::BlindBot,
     episode::EpisodeResult,
     vision::ObservationConfig,
@@ -107,11 +107,16 @@ impl Contestant {
     }
 }
 
-/// Returns the last of the discrete actions, or all values at their highest.
+/// Returns the last of the discrete actions or of the options of each choice, with all numbers at their highest.
 fn last_action(game: &dyn Game) -> ActionValue {
-    match game.actions() {
+    let space = game.actions();
+    let highest: Vec<u32> = space.choices().sizes().iter().map(|size| size.saturating_sub(1)).collect();
+    match space {
         ActionSpace::Discrete(count) => ActionValue::Discrete(count.saturating_sub(1) as u32),
         ActionSpace::Continuous(count) => ActionValue::Continuous(vec![1.0; count]),
+        ActionSpace::Mixed(MixedSpace { numbers, .. }) => {
+            ActionValue::Mixed { choices: highest, numbers: vec![1.0; numbers] }
+        }
     }
 }
 

@@ -7,13 +7,15 @@
 //! ```
 
 use crate::{
+    action::{ActionSpace, Actions},
     demo::file::{
-        episode::{Decider, DemoEnd, DemoEpisode, EpisodeActions},
+        episode::{Decider, DemoEnd, DemoEpisode},
         error::EpisodeFault,
-        header::{DemoActions, DemoHeader, LEVEL_FILES_FORMAT, RANDOMISED_FORMAT},
+        header::{DemoHeader, LEVEL_FILES_FORMAT, RANDOMISED_FORMAT},
     },
     level::{LevelFile, RandomisedValue},
 };
+use playbot_learner::MOST_CHOICES;
 
 /// Encodings of a list; the shorter one is used.
 const PLAIN: u8 = 0;
@@ -192,8 +194,8 @@ pub(super) fn payload(frame: &[u8]) -> Option<&[u8]> {
 /// | state hashes | `steps` × `u32` |
 /// | level seed | `u64` |
 /// | end | `u8`: 0 terminated without, 1 with success, 2 truncated, 3 aborted |
-/// | kind of actions | `u8`: 1, 2 or 4 bytes for a discrete action; 0 for continuous ones, then `u32` dimensions |
-/// | actions | discrete: list; continuous: `steps` × dimensions × `f32` |
+/// | kind of actions | `u8`: 1, 2 or 4 bytes for a discrete action; 0 for continuous ones, then `u32` dimensions; 3 for several choices and numbers, then `u32` choices and `u32` numbers |
+/// | actions | discrete: list; continuous: `steps` × dimensions × `f32`; several: a list of `u32` for each choice, then `steps` × numbers × `f32` |
 /// | rewards | list of `f32` |
 /// | deciders | list of `u8`: 0 human, 1 bot, 2 policy, 3 replay, 4 idle |
 /// | observation width | `u32` |
@@ -221,7 +223,7 @@ pub(super) fn encode_payload(
         DemoEnd::Aborted => 3,
     });
     match &episode.actions {
-        EpisodeActions::Discrete(actions) => {
+        Actions::Discrete(actions) => {
             // The actions were checked to be below the header's count, so the casts lose nothing.
             let size = action_size(header.actions);
             out.push(size);
@@ -231,9 +233,17 @@ pub(super) fn encode_payload(
                 _ => put_list(actions, out),
             }
         }
-        EpisodeActions::Continuous { dim, values } => {
+        Actions::Continuous { dim, values } => {
             out.push(0);
             put_plain(&[*dim as u32], out);
+            put_plain(values, out);
+        }
+        Actions::Mixed { choices, options, dim, values } => {
+            out.push(MIXED);
+            put_plain(&[*choices as u32, *dim as u32], out);
+            for choice in 0..*choices {
+                put_list(&options.iter().skip(choice).step_by(*choices).copied().collect::<Vec<u32>>(), out);
+            }
             put_plain(values, out);
         }
     }
@@ -327,11 +337,25 @@ pub(super) fn decode(payload: &[u8], header: &DemoHeader) -> Result<DemoEpisode,
         0 => {
             let dim = cursor.scalar::<u32>("the number of dimensions")? as usize;
             let count = steps.checked_mul(dim).ok_or_else(|| malformed("too many action values"))?;
-            EpisodeActions::Continuous { dim, values: cursor.plain(count, "action values")? }
+            Actions::Continuous { dim, values: cursor.plain(count, "action values")? }
         }
-        1 => EpisodeActions::Discrete(cursor.list::<u8>(steps, "actions")?.into_iter().map(u32::from).collect()),
-        2 => EpisodeActions::Discrete(cursor.list::<u16>(steps, "actions")?.into_iter().map(u32::from).collect()),
-        4 => EpisodeActions::Discrete(cursor.list(steps, "actions")?),
+        1 => Actions::Discrete(cursor.list::<u8>(steps, "actions")?.into_iter().map(u32::from).collect()),
+        2 => Actions::Discrete(cursor.list::<u16>(steps, "actions")?.into_iter().map(u32::from).collect()),
+        4 => Actions::Discrete(cursor.list(steps, "actions")?),
+        MIXED => {
+            let choices = cursor.scalar::<u32>("the number of choices")? as usize;
+            let dim = cursor.scalar::<u32>("the number of dimensions")? as usize;
+            if choices > MOST_CHOICES {
+                return Err(malformed(format!("{choices} choices at once: at most {MOST_CHOICES} are possible")));
+            }
+            let mut options = vec![0; steps * choices];
+            for choice in 0..choices {
+                let taken = cursor.list::<u32>(steps, "options")?;
+                options.iter_mut().skip(choice).step_by(choices).zip(taken).for_each(|(to, option)| *to = option);
+            }
+            let count = steps.checked_mul(dim).ok_or_else(|| malformed("too many action values"))?;
+            Actions::Mixed { choices, options, dim, values: cursor.plain(count, "action values")? }
+        }
         other => return Err(malformed(format!("unknown kind of actions {other}"))),
     };
     let rewards = cursor.list(steps, "rewards")?;
@@ -350,13 +374,17 @@ pub(super) fn decode(payload: &[u8], header: &DemoHeader) -> Result<DemoEpisode,
     Ok(episode)
 }
 
+/// The code of several choices and numbers, where a discrete action has its bytes.
+const MIXED: u8 = 3;
+
 /// Bytes of a discrete action; 0 for continuous ones.
-fn action_size(actions: DemoActions) -> u8 {
+fn action_size(actions: ActionSpace) -> u8 {
     match actions {
-        DemoActions::Discrete(0..=0x100) => 1,
-        DemoActions::Discrete(0x101..=0x1_0000) => 2,
-        DemoActions::Discrete(_) => 4,
-        DemoActions::Continuous(_) => 0,
+        ActionSpace::Discrete(0..=0x100) => 1,
+        ActionSpace::Discrete(0x101..=0x1_0000) => 2,
+        ActionSpace::Discrete(_) => 4,
+        ActionSpace::Continuous(_) => 0,
+        ActionSpace::Mixed(_) => MIXED,
     }
 }
 

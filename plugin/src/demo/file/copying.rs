@@ -1,11 +1,14 @@
 //! New recordings of the episodes of others: joined, selected, or with another player's name.
 
-use crate::demo::file::{
-    episode::{DemoEpisode, EpisodeActions},
-    error::{DemoFault, DemoFileError},
-    header::DemoHeader,
-    reader::DemoReader,
-    writer::DemoWriter,
+use crate::{
+    action::Actions,
+    demo::file::{
+        episode::DemoEpisode,
+        error::{DemoFault, DemoFileError},
+        header::DemoHeader,
+        reader::DemoReader,
+        writer::DemoWriter,
+    },
 };
 use std::{
     collections::{HashMap, HashSet},
@@ -152,9 +155,13 @@ fn hash_of_play(episode: &DemoEpisode) -> u64 {
     randomised.iter().for_each(|drawn| (&drawn.path, drawn.value.to_bits()).hash(&mut hasher));
     rewards.iter().for_each(|reward| reward.to_bits().hash(&mut hasher));
     match actions {
-        EpisodeActions::Discrete(list) => list.hash(&mut hasher),
-        EpisodeActions::Continuous { dim, values } => {
+        Actions::Discrete(list) => list.hash(&mut hasher),
+        Actions::Continuous { dim, values } => {
             dim.hash(&mut hasher);
+            values.iter().for_each(|value| value.to_bits().hash(&mut hasher));
+        }
+        Actions::Mixed { options, values, .. } => {
+            options.hash(&mut hasher);
             values.iter().for_each(|value| value.to_bits().hash(&mut hasher));
         }
     }

@@ -1,10 +1,8 @@
 //! One recorded episode in memory.
 
 use crate::{
-    demo::file::{
-        error::EpisodeFault,
-        header::{DemoActions, DemoHeader},
-    },
+    action::{ActionSpace, Actions},
+    demo::file::{error::EpisodeFault, header::DemoHeader},
     level::{LevelFile, RandomisedValue},
 };
 use serde::{Deserialize, Serialize};
@@ -51,20 +49,6 @@ pub enum DemoEnd {
     Aborted,
 }
 
-/// The actions of an episode, in the order of its ticks.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub enum EpisodeActions {
-    /// One action number per tick.
-    Discrete(Vec<u32>),
-    /// `dim` numbers per tick, tick after tick: `values` has shape `[steps, dim]`.
-    Continuous {
-        /// Numbers per tick.
-        dim: usize,
-        /// The numbers, row by row.
-        values: Vec<f32>,
-    },
-}
-
 /// One recorded episode: the data to run it again, and the expected outcome.
 ///
 /// All lists run over the ticks of the episode; `steps` is their common length.
@@ -79,7 +63,7 @@ pub struct DemoEpisode {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub randomised: Vec<RandomisedValue>,
     /// The action of each tick.
-    pub actions: EpisodeActions,
+    pub actions: Actions,
     /// The reward of each tick, `[steps]`.
     pub rewards: Vec<f32>,
     /// Hash of the game's state after each tick, `[steps]`.
@@ -95,15 +79,12 @@ pub struct DemoEpisode {
 
 impl DemoEpisode {
     /// Creates an episode without ticks, to be filled by a recorder.
-    pub fn new(level_seed: u64, actions: DemoActions) -> Self {
+    pub fn new(level_seed: u64, actions: ActionSpace) -> Self {
         Self {
             level_seed,
             level_file: None,
             randomised: Vec::new(),
-            actions: match actions {
-                DemoActions::Discrete(_) => EpisodeActions::Discrete(Vec::new()),
-                DemoActions::Continuous(dim) => EpisodeActions::Continuous { dim, values: Vec::new() },
-            },
+            actions: Actions::empty(&actions),
             rewards: Vec::new(),
             state_hashes: Vec::new(),
             deciders: Vec::new(),
@@ -162,20 +143,34 @@ impl DemoEpisode {
         let width = header.observation_names.len();
         length("observation values", self.observations.len(), steps.saturating_mul(width))?;
         match (&self.actions, header.actions) {
-            (EpisodeActions::Discrete(actions), DemoActions::Discrete(count)) => {
+            (Actions::Discrete(actions), ActionSpace::Discrete(count)) => {
                 length("actions", actions.len(), steps)?;
                 if let Some(step) = actions.iter().position(|&a| a as usize >= count) {
                     return Err(EpisodeFault::ActionRange { step, action: actions[step], count });
                 }
             }
-            (EpisodeActions::Continuous { dim, values }, DemoActions::Continuous(count)) if *dim == count => {
+            (Actions::Continuous { dim, values }, ActionSpace::Continuous(count)) if *dim == count => {
                 length("action values", values.len(), steps.saturating_mul(count))?;
                 finite("an action value", values, count)?;
             }
+            (Actions::Mixed { choices, options, dim, values }, ActionSpace::Mixed(space))
+                if (*choices, *dim) == (space.choices.sizes().len(), space.numbers) =>
+            {
+                length("options", options.len(), steps.saturating_mul(*choices))?;
+                length("action values", values.len(), steps.saturating_mul(*dim))?;
+                for (at, (&option, &size)) in options.iter().zip(space.choices.sizes().iter().cycle()).enumerate() {
+                    if option >= size {
+                        let step = at / (*choices).max(1);
+                        return Err(EpisodeFault::ActionRange { step, action: option, count: size as usize });
+                    }
+                }
+                finite("an action value", values, *dim)?;
+            }
             (found, expected) => {
                 let found = match found {
-                    EpisodeActions::Discrete(_) => "discrete".to_owned(),
-                    EpisodeActions::Continuous { dim, .. } => DemoActions::Continuous(*dim).to_string(),
+                    Actions::Discrete(_) => "discrete".to_owned(),
+                    Actions::Continuous { dim, .. } => ActionSpace::Continuous(*dim).to_string(),
+                    Actions::Mixed { choices, dim, .. } => format!("{choices} choices and {dim} numbers"),
                 };
                 return Err(EpisodeFault::ActionKind { found, expected: expected.to_string() });
             }
@@ -205,19 +200,19 @@ mod tests {
     fn header() -> DemoHeader {
         DemoHeader {
             observation_names: vec!["x".into(), "y".into()],
-            ..DemoHeader::new("game", 1, "easy", 60.0, DemoActions::Discrete(4))
+            ..DemoHeader::new("game", 1, "easy", 60.0, ActionSpace::Discrete(4))
         }
     }
 
     fn episode() -> DemoEpisode {
         DemoEpisode {
-            actions: EpisodeActions::Discrete(vec![0, 3]),
+            actions: Actions::Discrete(vec![0, 3]),
             rewards: vec![0.5, 10.0],
             state_hashes: vec![1, 2],
             deciders: vec![Decider::Human; 2],
             end: DemoEnd::Terminated { success: true },
             observations: vec![0.0, 1.0, 2.0, 3.0],
-            ..DemoEpisode::new(7, DemoActions::Discrete(4))
+            ..DemoEpisode::new(7, ActionSpace::Discrete(4))
         }
     }
 
@@ -225,7 +220,7 @@ mod tests {
     fn a_sound_episode_passes() {
         assert_eq!(episode().check(&header()), Ok(()));
         assert_eq!((episode().len(), episode().episode_return(), episode().is_success()), (2, 10.5, true));
-        assert_eq!(DemoEpisode::new(7, DemoActions::Discrete(4)).check(&header()), Ok(()));
+        assert_eq!(DemoEpisode::new(7, ActionSpace::Discrete(4)).check(&header()), Ok(()));
     }
 
     #[test]
@@ -243,11 +238,11 @@ mod tests {
         e.rewards.pop();
         assert_eq!(text(e), "1 rewards for 2 steps (expected 2)");
         let mut e = episode();
-        e.actions = EpisodeActions::Discrete(vec![0, 4]);
+        e.actions = Actions::Discrete(vec![0, 4]);
         assert_eq!(text(e), "action 4 at step 1 is out of range: the game has actions 0 to 3");
         let mut e = episode();
-        e.actions = EpisodeActions::Continuous { dim: 1, values: vec![0.0; 2] };
-        assert_eq!(text(e), "the actions are continuous (1 dimensions), but the header says discrete (4 actions)");
+        e.actions = Actions::Continuous { dim: 1, values: vec![0.0; 2] };
+        assert_eq!(text(e), "the actions are continuous actions of 1 number, but the header says 4 discrete actions");
         let mut e = episode();
         e.observations[3] = f32::NAN;
         assert_eq!(text(e), "an observation value at step 1 is NaN, not a finite number");

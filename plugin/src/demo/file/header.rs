@@ -1,10 +1,10 @@
 //! The header of a recording: its contents and conditions.
 
-use crate::demo::file::error::DemoFault;
+use crate::{action::ActionSpace, demo::file::error::DemoFault};
 use serde::{Deserialize, Serialize};
 
 /// Newest format that this version of the crate reads and writes.
-pub const DEMO_FORMAT: u32 = RANDOMISED_FORMAT;
+pub const DEMO_FORMAT: u32 = MIXED_FORMAT;
 
 /// Format of recordings that name no level files. Written where possible, since older programs read it too.
 const PLAIN_FORMAT: u32 = 1;
@@ -15,38 +15,15 @@ pub(super) const LEVEL_FILES_FORMAT: u32 = 2;
 /// First format in which every episode names the values that were drawn for its level.
 pub(super) const RANDOMISED_FORMAT: u32 = 3;
 
-/// The kind and number of actions of a recording.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum DemoActions {
-    /// One of `n` actions per tick, numbered from 0.
-    Discrete(usize),
-    /// `n` numbers per tick.
-    Continuous(usize),
-}
-
-impl DemoActions {
-    /// Returns the number of actions (discrete) or of dimensions (continuous).
-    pub fn count(self) -> usize {
-        match self {
-            Self::Discrete(n) | Self::Continuous(n) => n,
-        }
-    }
-}
-
-impl std::fmt::Display for DemoActions {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Discrete(n) => write!(f, "discrete ({n} actions)"),
-            Self::Continuous(n) => write!(f, "continuous ({n} dimensions)"),
-        }
-    }
-}
+/// First format with several choices at once.
+const MIXED_FORMAT: u32 = 4;
 
 /// Contents and conditions of a recording. Written as RON text at the top of the file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DemoHeader {
-    /// Format of the file: 1, 2 where levels are files, or 3 where levels draw values of the game.
+    /// Format of the file: 1, 2 where levels are files, 3 where levels draw values of the game, or 4 where several choices
+    /// are made at once.
     pub format: u32,
     /// Name of the game.
     pub game: String,
@@ -57,7 +34,7 @@ pub struct DemoHeader {
     /// Fixed ticks per second of game time.
     pub tick_hz: f64,
     /// Kind and number of actions.
-    pub actions: DemoActions,
+    pub actions: ActionSpace,
     /// Names of the observation values kept for each tick; empty when observations are not kept.
     pub observation_names: Vec<String>,
     /// The player: a person's nickname, or the name of a bot.
@@ -71,9 +48,9 @@ pub struct DemoHeader {
 
 impl DemoHeader {
     /// Creates a header in the oldest sufficient format, without observations, noise or a note.
-    pub fn new(game: &str, game_version: u32, mode: &str, tick_hz: f64, actions: DemoActions) -> Self {
+    pub fn new(game: &str, game_version: u32, mode: &str, tick_hz: f64, actions: ActionSpace) -> Self {
         Self {
-            format: PLAIN_FORMAT,
+            format: if matches!(actions, ActionSpace::Mixed(_)) { MIXED_FORMAT } else { PLAIN_FORMAT },
             game: game.to_owned(),
             game_version,
             mode: mode.to_owned(),
@@ -93,7 +70,7 @@ impl DemoHeader {
 
     /// Changes the format to that of levels that draw values of the game, which the episodes name.
     pub fn with_randomised_values(self) -> Self {
-        Self { format: RANDOMISED_FORMAT, ..self }
+        Self { format: self.format.max(RANDOMISED_FORMAT), ..self }
     }
 
     /// Checks the values.
@@ -119,7 +96,7 @@ impl DemoHeader {
             return refuse("action_noise", format!("{} is neither 0 nor a positive number", self.action_noise));
         }
         // Counts are stored in 32 bits, and discrete actions are `u32`.
-        if self.actions.count() == 0 || self.actions.count() > u32::MAX as usize {
+        if self.actions.is_empty() || self.actions.dim() > u32::MAX as usize {
             return refuse("actions", format!("{} cannot be played", self.actions));
         }
         Ok(())
@@ -181,7 +158,7 @@ mod tests {
     use super::*;
 
     fn header() -> DemoHeader {
-        DemoHeader::new("coinrun", 3, "easy", 60.0, DemoActions::Discrete(15))
+        DemoHeader::new("coinrun", 3, "easy", 60.0, ActionSpace::Discrete(15))
     }
 
     #[test]
@@ -192,7 +169,7 @@ mod tests {
             ("tick_hz", DemoHeader { tick_hz: 0.0, ..header() }),
             ("tick_hz", DemoHeader { tick_hz: f64::NAN, ..header() }),
             ("action_noise", DemoHeader { action_noise: f64::INFINITY, ..header() }),
-            ("actions", DemoHeader { actions: DemoActions::Continuous(0), ..header() }),
+            ("actions", DemoHeader { actions: ActionSpace::Continuous(0), ..header() }),
             ("format", DemoHeader { format: 0, ..header() }),
         ] {
             let error = header.check().expect_err(field);

@@ -171,11 +171,12 @@ fn first(top: &[u8]) -> Option<DemoHeader> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::demo::file::{
-        DemoReader,
-        header::DemoActions,
-        repair,
-        testing::{self, episode, write},
+    use crate::{
+        action::ActionSpace,
+        demo::file::{
+            DemoReader, repair,
+            testing::{self, episode, write},
+        },
     };
     use std::fs;
 
@@ -183,7 +184,7 @@ mod tests {
         DemoHeader {
             observation_names: vec!["x".into(), "y \"quoted\"\n".into()],
             demonstrator: "Zoë".into(),
-            ..DemoHeader::new("coinrun", 3, "easy", 60.0, DemoActions::Discrete(15))
+            ..DemoHeader::new("coinrun", 3, "easy", 60.0, ActionSpace::Discrete(15))
         }
     }
 

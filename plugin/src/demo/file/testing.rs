@@ -1,6 +1,9 @@
 //! Small recordings for the tests of this module.
 
-use crate::demo::file::{Decider, DemoActions, DemoEnd, DemoEpisode, DemoHeader, DemoWriter, EpisodeActions};
+use crate::{
+    action::{ActionSpace, Actions},
+    demo::file::{Decider, DemoEnd, DemoEpisode, DemoHeader, DemoWriter},
+};
 use std::path::{Path, PathBuf};
 
 /// Returns a small header with two observation values.
@@ -8,7 +11,7 @@ pub(super) fn header() -> DemoHeader {
     DemoHeader {
         observation_names: vec!["x".into(), "y".into()],
         demonstrator: "tester".into(),
-        ..DemoHeader::new("walk", 2, "easy", 60.0, DemoActions::Discrete(4))
+        ..DemoHeader::new("walk", 2, "easy", 60.0, ActionSpace::Discrete(4))
     }
 }
 
@@ -19,7 +22,7 @@ pub(super) fn episode(level_seed: u64, steps: usize) -> DemoEpisode {
         level_seed,
         level_file: None,
         randomised: Vec::new(),
-        actions: EpisodeActions::Discrete((0..steps).map(|t| (value(t) % 4) as u32).collect()),
+        actions: Actions::Discrete((0..steps).map(|t| (value(t) % 4) as u32).collect()),
         rewards: (0..steps).map(|t| if t + 1 == steps { 10.0 } else { 0.0 }).collect(),
         state_hashes: (0..steps).map(|t| value(t) as u32).collect(),
         deciders: (0..steps).map(|t| if t < 2 { Decider::Human } else { Decider::Bot }).collect(),

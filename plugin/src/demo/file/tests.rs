@@ -1,8 +1,11 @@
 //! Tests of whole files: round trips, cuts, flips of bits, hostile lengths, summaries, search and merging.
 
-use crate::demo::file::{
-    testing::{episode, header, write},
-    *,
+use crate::{
+    action::{ActionSpace, Actions},
+    demo::file::{
+        testing::{episode, header, write},
+        *,
+    },
 };
 use proptest::prelude::*;
 use std::{
@@ -213,12 +216,11 @@ fn a_place_that_cannot_be_written_is_named() {
 #[test]
 fn a_tick_takes_about_five_bytes() {
     let steps = 1000;
-    let header = DemoHeader::new("coinrun", 1, "easy", 60.0, DemoActions::Discrete(15));
+    let header = DemoHeader::new("coinrun", 1, "easy", 60.0, ActionSpace::Discrete(15));
     let mut bytes = 0;
     for seed in 0..100 {
         let mut one = episode(seed, steps);
-        one.actions =
-            EpisodeActions::Discrete((0..steps as u32).map(|t| t.wrapping_mul(2_654_435_761) >> 7 & 7).collect());
+        one.actions = Actions::Discrete((0..steps as u32).map(|t| t.wrapping_mul(2_654_435_761) >> 7 & 7).collect());
         one.observations.clear();
         bytes += crate::demo::file::bytes::encode(&one, &header).expect("valid").len();
     }
@@ -226,10 +228,14 @@ fn a_tick_takes_about_five_bytes() {
 }
 
 prop_compose! {
-    fn any_episode(actions: DemoActions, width: usize)(steps in 0usize..40)(
+    fn any_episode(actions: ActionSpace, width: usize)(steps in 0usize..40)(
         level_seed in any::<u64>(),
-        discrete in prop::collection::vec(0..actions.count().min(u32::MAX as usize) as u32, steps),
-        values in prop::collection::vec(-1e6f32..1e6, steps * actions.count().min(8)),
+        // The smallest choice of `any_recording` has two options.
+        discrete in prop::collection::vec(0..match actions {
+            ActionSpace::Mixed(_) => 2,
+            _ => actions.dim().min(u32::MAX as usize) as u32,
+        }, steps * actions.choices().sizes().len().max(1)),
+        values in prop::collection::vec(-1e6f32..1e6, steps * actions.numbers()),
         rewards in prop::collection::vec(prop_oneof![4 => Just(0.0f32), 1 => any::<f32>().prop_filter("finite", |v| v.is_finite())], steps),
         state_hashes in prop::collection::vec(any::<u32>(), steps),
         deciders in prop::collection::vec(prop_oneof![
@@ -241,8 +247,11 @@ prop_compose! {
         observations in prop::collection::vec(-1e6f32..1e6, steps * width),
     ) -> DemoEpisode {
         let actions = match actions {
-            DemoActions::Discrete(_) => EpisodeActions::Discrete(discrete),
-            DemoActions::Continuous(dim) => EpisodeActions::Continuous { dim, values },
+            ActionSpace::Discrete(_) => Actions::Discrete(discrete),
+            ActionSpace::Continuous(dim) => Actions::Continuous { dim, values },
+            ActionSpace::Mixed(space) => {
+                Actions::Mixed { choices: space.choices.sizes().len(), options: discrete, dim: space.numbers, values }
+            }
         };
         let randomised = Vec::new();
         DemoEpisode { level_seed, level_file: None, randomised, actions, rewards, state_hashes, deciders, end, observations }
@@ -251,9 +260,10 @@ prop_compose! {
 
 fn any_recording() -> impl Strategy<Value = (DemoHeader, Vec<DemoEpisode>)> {
     let kinds = prop_oneof![
-        (1usize..300).prop_map(DemoActions::Discrete),
-        (65_000usize..66_000).prop_map(DemoActions::Discrete),
-        (1usize..4).prop_map(DemoActions::Continuous),
+        (1usize..300).prop_map(ActionSpace::Discrete),
+        (65_000usize..66_000).prop_map(ActionSpace::Discrete),
+        (1usize..4).prop_map(ActionSpace::Continuous),
+        (2usize..5, 0usize..3).prop_map(|(size, numbers)| ActionSpace::mixed([size, 2, 3], numbers)),
     ];
     (kinds, 0usize..3, ".{1,12}", any::<u32>(), 1e-3f64..1e4, ".{0,20}").prop_flat_map(
         |(actions, width, game, game_version, tick_hz, note)| {
@@ -389,7 +399,7 @@ fn episodes_that_another_file_has_too_are_counted() {
     let alone = merge_demos(&[&one], folder.path().join("alone.demo")).expect("merges");
     assert_eq!(alone.equal_episodes, 0);
     let mut turned = a;
-    let EpisodeActions::Discrete(list) = &mut turned.actions else { panic!("they are numbers") };
+    let Actions::Discrete(list) = &mut turned.actions else { panic!("they are numbers") };
     list[0] ^= 1;
     let three = write(folder.path(), "three.demo", &[turned]);
     assert_eq!(merge_demos(&[&one, &three], folder.path().join("more.demo")).expect("merges").equal_episodes, 0);
@@ -415,7 +425,7 @@ fn files_that_do_not_belong_together_are_refused_by_name_and_nothing_is_written(
         ("version", DemoHeader { game_version: 3, ..header() }, "version 3 of `walk`, but this is version 2"),
         ("mode", DemoHeader { mode: "hard".into(), ..header() }, "mode `hard`"),
         ("rate", DemoHeader { tick_hz: 30.0, ..header() }, "`tick_hz` is 30.0, but 60.0 in"),
-        ("actions", DemoHeader { actions: DemoActions::Discrete(5), ..header() }, "`actions` is Discrete(5)"),
+        ("actions", DemoHeader { actions: ActionSpace::Discrete(5), ..header() }, "`actions` is Discrete(5)"),
         (
             "noise",
             DemoHeader { action_noise: 0.5, ..header() },

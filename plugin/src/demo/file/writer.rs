@@ -293,7 +293,7 @@ mod tests {
     use std::sync::{Arc, Mutex};
 
     use super::*;
-    use crate::demo::file::header::DemoActions;
+    use crate::action::ActionSpace;
     use crate::demo::file::testing::{episode, header};
     use crate::demo::file::writer::store_tests::SmallDisk;
 
@@ -348,7 +348,7 @@ mod tests {
         bad.rewards[1] = f32::NAN;
         assert!(matches!(writer.push(&bad), Err(DemoFileError { fault: DemoFault::RefusedEpisode(_), .. })));
         assert_eq!(bytes.lock().expect("one thread").len() as u64, writer.bytes());
-        let foreign = DemoEpisode::new(1, DemoActions::Continuous(2));
+        let foreign = DemoEpisode::new(1, ActionSpace::Continuous(2));
         assert!(writer.push(&foreign).is_err());
     }
 

@@ -8,13 +8,14 @@ use crate::{
     explore::CellGrid,
 };
 use bevy_playbot::{
-    action::{ActionSpace, ActionValue},
+    action::ActionValue,
     episode::EpisodeResult,
     fault::Fault,
 };
 use playbot_harness::{
     detector::DetectorSetting,
-    game::{Game, idle_action, is_named_idle},
+    game::{Game, idle_action},
+    single_actions::{SingleAction, single_actions},
 };
 
 /// A finding for actions that do the same as doing nothing, at every moment of an episode at which they are tried.
@@ -179,28 +180,14 @@ fn gets_around(script: &Script<'_>, course: &Course, moments: &[usize]) -> bool 
     cells.len() > 1 && cells.len() >= moments.len().div_ceil(2)
 }
 
-/// Returns the actions to try: each choice that is not named as doing nothing, or each continuous value, far up and far
-/// down.
+/// Returns the actions to try: each option that is not named as doing nothing, or each number, far up and far down.
 pub(super) fn tried(game: &dyn Game) -> Vec<(String, Vec<ActionValue>)> {
-    let (names, idle) = (game.tools().input.action_names(), idle_action(game));
-    let named =
-        |number: usize| names.get(number).map_or_else(|| format!("action {number}"), |name| format!("`{name}`"));
-    match game.actions() {
-        ActionSpace::Discrete(count) => {
-            let choices = (0..count as u32).map(|choice| (choice, ActionValue::Discrete(choice)));
-            let is_something =
-                |(choice, action): &(u32, ActionValue)| *action != idle && !is_named_idle(&names, *choice);
-            choices.filter(is_something).map(|(choice, action)| (named(choice as usize), vec![action])).collect()
-        }
-        ActionSpace::Continuous(count) => {
-            let way = |number: usize, value: f32| {
-                let mut values = vec![0.0; count];
-                values[number] = value;
-                ActionValue::Continuous(values)
-            };
-            (0..count).map(|number| (named(number), [1.0, -1.0].map(|value| way(number, value)).to_vec())).collect()
-        }
-    }
+    let doing = single_actions(game).into_iter().filter(|single| !single.is_idle);
+    let named = |SingleAction { name, number, ways, .. }| {
+        let of_number = || format!("action {number}");
+        (name.map_or_else(of_number, |name| format!("`{name}`")), ways)
+    };
+    doing.map(named).collect()
 }
 
 #[cfg(test)]
@@ -208,7 +195,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     use bevy::prelude::*;
-    use bevy_playbot::{bot::BlindBot, episode::EpisodeEnd, vision::ObservationConfig};
+    use bevy_playbot::{action::ActionSpace, bot::BlindBot, episode::EpisodeEnd, vision::ObservationConfig};
 
     use super::*;
     use playbot_harness::{eval::Player, foreign::ForeignGame};

@@ -175,7 +175,7 @@ impl EpisodeWatcher for Still {
         let is_long = self.same >= LEAST && self.same.saturating_mul(2) >= result.ticks;
         let has_tried = || match moment.action {
             ActionValue::Discrete(_) => self.presses.since_all > RELEASED,
-            ActionValue::Continuous(_) => self.efforts.are_many(self.same),
+            ActionValue::Continuous(_) | ActionValue::Mixed { .. } => self.efforts.are_many(self.same),
         };
         (is_cut && is_long && has_tried()).then(|| self.reported(moment))
     }

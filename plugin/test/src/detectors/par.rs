@@ -160,9 +160,8 @@ fn of_recordings(path: &Path, game: &dyn Game) -> Result<BTreeMap<String, f64>, 
 
 #[cfg(test)]
 mod tests {
-    use bevy_playbot::demo::file::{
-        Decider, DemoActions, DemoEnd, DemoEpisode, DemoHeader, DemoWriter, EpisodeActions,
-    };
+    use bevy_playbot::action::{ActionSpace, Actions};
+    use bevy_playbot::demo::file::{Decider, DemoEnd, DemoEpisode, DemoHeader, DemoWriter};
 
     use super::*;
     use playbot_harness::foreign::ForeignGame;
@@ -209,17 +208,17 @@ mod tests {
     fn the_fastest_episode_that_won_is_the_par_of_its_level() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("people.demo");
-        let header = DemoHeader::new("garden", 1, "hard", 20.0, DemoActions::Discrete(2));
+        let header = DemoHeader::new("garden", 1, "hard", 20.0, ActionSpace::Discrete(2));
         let mut writer = DemoWriter::replace(&path, header).expect("writable");
         let won = DemoEnd::Terminated { success: true };
         for (level, ticks, end) in [(7, 9, won), (7, 5, won), (7, 2, DemoEnd::Truncated), (8, 3, DemoEnd::Aborted)] {
             let episode = DemoEpisode {
-                actions: EpisodeActions::Discrete(vec![1; ticks]),
+                actions: Actions::Discrete(vec![1; ticks]),
                 rewards: vec![0.0; ticks],
                 state_hashes: vec![1; ticks],
                 deciders: vec![Decider::Human; ticks],
                 end,
-                ..DemoEpisode::new(level, DemoActions::Discrete(2))
+                ..DemoEpisode::new(level, ActionSpace::Discrete(2))
             };
             writer.push(&episode).expect("writable");
         }

@@ -10,8 +10,8 @@ use crate::{
 };
 use bevy::math::Vec2;
 use bevy_playbot::{
-    action::ActionValue,
-    demo::file::{DemoEnd, DemoEpisode, EpisodeActions},
+    action::{ActionValue, Actions},
+    demo::file::{DemoEnd, DemoEpisode},
     episode::EpisodeEnd,
     level::LevelFile,
     vision::ObservationConfig,
@@ -173,12 +173,14 @@ pub fn course_of_recording(game: &dyn Game, mode: &str, recorded: &DemoEpisode) 
 }
 
 /// Returns the name of the last action up to a tick that does something by its name.
-fn last_action(game: &dyn Game, actions: &EpisodeActions, tick: u32) -> Option<String> {
-    let EpisodeActions::Discrete(actions) = actions else { return None };
-    let names = game.tools().input.action_names();
-    let until = actions.iter().take(tick as usize + 1);
-    let last = until.rev().find(|&&action| !is_named_idle(&names, action))?;
-    names.get(*last as usize).cloned()
+fn last_action(game: &dyn Game, actions: &Actions, tick: u32) -> Option<String> {
+    let (names, choices) = (game.tools().input.action_names(), game.actions().choices());
+    let doing = |row: usize| {
+        let taken = choices.ranges().zip(actions.chosen(row)).map(|(at, &option)| at.start as u32 + option);
+        taken.filter(|&number| !is_named_idle(&names, number)).last()
+    };
+    let last = (0..actions.len().min(tick as usize + 1)).rev().find_map(doing)?;
+    names.get(last as usize).cloned()
 }
 
 /// Returns the first tick whose reward, state or end is not the recorded one.
@@ -309,9 +311,9 @@ mod tests {
     use crate::findings::{Checks, FindingHead, keep::recheck};
     use bevy::prelude::*;
     use bevy_playbot::{
-        action::ActionValue,
+        action::{ActionSpace, ActionValue, Actions},
         bot::BlindBot,
-        demo::file::{Decider, DemoActions, DemoEpisode, EpisodeActions},
+        demo::file::{Decider, DemoEpisode},
     };
     use playbot_corridor::{Corridor, Rule, to_the_goal};
     use playbot_harness::{foreign::ForeignGame, level_files::LevelDesign};
@@ -356,8 +358,8 @@ mod tests {
             .position(|walker: Single<&Transform, With<Walker>>| walker.translation.truncate())
             .every(4)
             .time_limit(100);
-        let mut recorded = DemoEpisode::new(0, DemoActions::Discrete(2));
-        recorded.actions = EpisodeActions::Discrete(vec![0, 1, 1, 0]);
+        let mut recorded = DemoEpisode::new(0, ActionSpace::Discrete(2));
+        recorded.actions = Actions::Discrete(vec![0, 1, 1, 0]);
         (recorded.rewards, recorded.state_hashes) = (vec![0.0; 4], vec![0; 4]);
         recorded.deciders = vec![Decider::Human; 4];
         let course = course_of_recording(&game, "default", &recorded);

@@ -3,14 +3,14 @@
 use crate::{detectors::ErrorLogReader, findings::StoredFinding};
 use bevy::prelude::*;
 use bevy_playbot::{
-    action::{Action, ActionSpace, ActionValue},
+    action::{Action, ActionSpace, ActionValue, Actions},
     agent::Control,
     bot::BlindBot,
     demo::{
-        file::{DemoEpisode, EpisodeActions},
+        file::DemoEpisode,
         replay::Replay,
     },
-    engine::{EpisodeSeeds, LevelFiles, demo_actions, misfit, panics::PanicReports, recorded_action, tick_world},
+    engine::{EpisodeSeeds, LevelFiles, misfit, panics::PanicReports, tick_world},
     episode::{Episode, EpisodeResult},
     fault::Fault,
     level::{LevelFile, LevelQueue},
@@ -360,7 +360,7 @@ impl StoredFinding {
                 game.version()
             )));
         }
-        let actions = demo_actions(&game.actions());
+        let actions = game.actions();
         if header.actions != actions {
             return Err(Unplayable(format!(
                 "its actions are {}, but those of `{}` are {actions}",
@@ -424,29 +424,14 @@ pub(super) fn efforts(actions: &[ActionValue], idle: &ActionValue) -> u32 {
     u32::try_from(actions.iter().filter(|action| *action != idle).count()).unwrap_or(u32::MAX)
 }
 
-/// Returns the actions of a recorded episode.
-pub(super) fn listed(actions: &EpisodeActions) -> Vec<ActionValue> {
-    (0..).map_while(|tick| recorded_action(actions, tick)).collect()
-}
-
 /// Returns the actions for a recording. Actions that do not fit the space are left out.
-pub(super) fn recorded(actions: &[ActionValue], space: &ActionSpace) -> EpisodeActions {
-    match space {
-        ActionSpace::Discrete(_) => {
-            let index = |action: &ActionValue| match action {
-                ActionValue::Discrete(index) => Some(*index),
-                ActionValue::Continuous(_) => None,
-            };
-            EpisodeActions::Discrete(actions.iter().filter_map(index).collect())
-        }
-        ActionSpace::Continuous(dim) => {
-            let values = actions.iter().filter_map(|action| match action {
-                ActionValue::Continuous(values) => Some(values.iter().copied()),
-                ActionValue::Discrete(_) => None,
-            });
-            EpisodeActions::Continuous { dim: *dim, values: values.flatten().collect() }
-        }
-    }
+pub(super) fn recorded(actions: &[ActionValue], space: &ActionSpace) -> Actions {
+    let mut all = Actions::empty(space);
+    actions.iter().filter(|action| misfit(action, space).is_none()).for_each(|action| {
+        // It was found to fit.
+        let _ = all.push(action);
+    });
+    all
 }
 
 // Panics and faults of a game during an episode.
@@ -541,11 +526,11 @@ mod tests {
     fn actions_go_into_recordings_and_come_back() {
         let space = ActionSpace::Discrete(3);
         let actions = [2, 0, 1].map(ActionValue::Discrete);
-        assert_eq!(listed(&recorded(&actions, &space)), actions);
+        assert!(recorded(&actions, &space).iter().eq(actions.iter().cloned()));
         let space = ActionSpace::Continuous(2);
         let actions = [ActionValue::Continuous(vec![0.5, -1.0]), ActionValue::Continuous(vec![0.0, 0.0])];
-        assert_eq!(listed(&recorded(&actions, &space)), actions);
-        assert!(listed(&recorded(&[], &space)).is_empty());
+        assert!(recorded(&actions, &space).iter().eq(actions.iter().cloned()));
+        assert!(recorded(&[], &space).is_empty());
         assert_eq!(efforts(&actions, &actions[1]), 1);
     }
 

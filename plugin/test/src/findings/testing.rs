@@ -1,7 +1,8 @@
 //! Findings for tests.
 
 use crate::findings::{CourseEnd, FindingHead, RecordedCourse, StoredFinding};
-use bevy_playbot::demo::file::{Decider, DemoActions, DemoEpisode, DemoHeader, EpisodeActions};
+use bevy_playbot::action::{ActionSpace, Actions};
+use bevy_playbot::demo::file::{Decider, DemoEpisode, DemoHeader};
 
 /// A finding of this detector in `hard:7`, at tick 2.
 pub(super) fn head(detector: &str) -> FindingHead {
@@ -12,9 +13,9 @@ pub(super) fn head(detector: &str) -> FindingHead {
 
 /// A panic after three actions, in a game that need not exist.
 pub(super) fn stored() -> StoredFinding {
-    let header = DemoHeader::new("garden", 1, "hard", 20.0, DemoActions::Discrete(2));
-    let mut episode = DemoEpisode::new(7, DemoActions::Discrete(2));
-    episode.actions = EpisodeActions::Discrete(vec![1, 0, 1]);
+    let header = DemoHeader::new("garden", 1, "hard", 20.0, ActionSpace::Discrete(2));
+    let mut episode = DemoEpisode::new(7, ActionSpace::Discrete(2));
+    episode.actions = Actions::Discrete(vec![1, 0, 1]);
     episode.rewards = vec![0.0; 3];
     episode.state_hashes = vec![3, 0x1f, 0x1f];
     episode.deciders = vec![Decider::Bot; 3];

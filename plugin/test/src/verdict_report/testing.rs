@@ -9,8 +9,8 @@ use crate::{
 };
 use bevy::prelude::*;
 use bevy_playbot::{
-    action::ActionSpace,
-    demo::file::{Decider, DemoActions, DemoEpisode, DemoHeader, EpisodeActions},
+    action::{ActionSpace, Actions},
+    demo::file::{Decider, DemoEpisode, DemoHeader},
     observation::ObservationSpace,
 };
 use playbot_harness::{
@@ -143,9 +143,9 @@ pub(crate) fn finding(detector: &str, message: &str) -> Finding {
 
 /// Writes an episode of two ticks with this head into `findings`, in the folder of a test.
 pub(crate) fn keep(folder: &Path, name: &str, head: FindingHead) {
-    let header = DemoHeader::new("garden", 1, "hard", 15.0, DemoActions::Discrete(2));
+    let header = DemoHeader::new("garden", 1, "hard", 15.0, ActionSpace::Discrete(2));
     let mut episode = DemoEpisode::new(0, header.actions);
-    episode.actions = EpisodeActions::Discrete(vec![1, 0]);
+    episode.actions = Actions::Discrete(vec![1, 0]);
     (episode.rewards, episode.state_hashes) = (vec![0.0; 2], vec![1, 2]);
     episode.deciders = vec![Decider::Bot; 2];
     let folder = folder.join(FINDINGS);

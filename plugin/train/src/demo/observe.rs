@@ -3,13 +3,13 @@
 use crate::demo::{Demonstration, Demonstrations};
 use bevy::prelude::*;
 use bevy_playbot::{
-    action::{ActionSpace, ActionValue},
+    action::ActionSpace,
     agent::{Agent, Control},
     demo::{
         file::DemoEpisode,
         replay::{Divergence, Replay},
     },
-    engine::{recorded_action, tick_world},
+    engine::tick_world,
     fault::Fault,
     legal::LegalActions,
     observation::Observation,
@@ -306,13 +306,17 @@ impl ReplayWorld {
 /// Adds the mask of a tick to those of the ticks before it. Without a mask every action is legal. People may press what
 /// is illegal, and the recorded action has to be a possible one for a learner.
 fn push_mask(legal: &mut Vec<bool>, tick: usize, mask: Option<&LegalActions>, space: &ActionSpace, replay: &Replay) {
-    let (ActionSpace::Discrete(actions), false) = (space, mask.is_none() && legal.is_empty()) else { return };
-    legal.resize(tick * actions, true);
+    let options = space.options();
+    if options == 0 || (mask.is_none() && legal.is_empty()) {
+        return;
+    }
+    legal.resize(tick * options, true);
     legal.extend(mask.iter().flat_map(|mask| mask.mask()));
-    legal.resize((tick + 1) * actions, true);
-    if let Some(ActionValue::Discrete(action)) = recorded_action(&replay.episode().actions, tick)
-        && let Some(is_legal) = legal.get_mut(tick * actions + action as usize)
-    {
-        *is_legal = true;
+    legal.resize((tick + 1) * options, true);
+    let Some(action) = replay.episode().actions.get(tick) else { return };
+    for (at, &option) in space.choices().ranges().zip(action.options()) {
+        if let Some(is_legal) = legal.get_mut(tick * options + at.start + option as usize) {
+            *is_legal = true;
+        }
     }
 }

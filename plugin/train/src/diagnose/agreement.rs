@@ -104,7 +104,7 @@ pub fn agreement(episodes: &[(Vec<&[f32]>, Vec<ActionValue>)]) -> Option<Agreeme
     }
     let chance = chance(&steps.iter().map(|(_, _, action)| *action).collect::<Vec<_>>());
     let agreed = agreed / pairs.max(1) as f64;
-    let is_continuous = matches!(steps.first(), Some((_, _, ActionValue::Continuous(_))));
+    let is_continuous = steps.first().is_some_and(|(_, _, action)| action.options().is_empty());
     let beyond = |agreed: f64| match is_continuous {
         true => 1.0 - agreed / chance.max(1e-12),
         false => (agreed - chance) / (1.0 - chance).max(1e-12),
@@ -118,40 +118,28 @@ pub fn agreement(episodes: &[(Vec<&[f32]>, Vec<ActionValue>)]) -> Option<Agreeme
 
 /// Returns 1 for equal discrete actions and 0 for others, or the squared distance of continuous ones.
 fn likeness(one: &ActionValue, other: &ActionValue) -> f64 {
-    match (one, other) {
-        (ActionValue::Continuous(one), ActionValue::Continuous(other)) => {
-            one.iter().zip(other).map(|(one, other)| f64::from(one - other).powi(2)).sum()
-        }
-        (one, other) => f64::from(u8::from(one == other)),
+    if one.options().is_empty() {
+        let distances = one.numbers().iter().zip(other.numbers());
+        return distances.map(|(one, other)| f64::from(one - other).powi(2)).sum();
     }
+    f64::from(u8::from(one.options() == other.options()))
 }
 
 /// Returns the mean likeness of two steps drawn at random.
 fn chance(actions: &[&ActionValue]) -> f64 {
     let count = actions.len().max(1) as f64;
-    match actions.first() {
-        Some(ActionValue::Continuous(first)) => (0..first.len())
-            .map(|at| {
-                let values = || {
-                    actions.iter().filter_map(move |action| match action {
-                        ActionValue::Continuous(values) => values.get(at).map(|value| f64::from(*value)),
-                        ActionValue::Discrete(_) => None,
-                    })
-                };
-                let average = mean(values()).unwrap_or_default();
-                2.0 * mean(values().map(|value| (value - average).powi(2))).unwrap_or_default()
-            })
-            .sum(),
-        _ => {
-            let mut counts = BTreeMap::<u32, f64>::new();
-            for action in actions {
-                if let ActionValue::Discrete(number) = action {
-                    *counts.entry(*number).or_default() += 1.0;
-                }
-            }
-            counts.values().map(|number| (number / count).powi(2)).sum()
-        }
+    let Some(first) = actions.first() else { return 0.0 };
+    if !first.options().is_empty() {
+        let mut counts = BTreeMap::<&[u32], f64>::new();
+        actions.iter().for_each(|action| *counts.entry(action.options()).or_default() += 1.0);
+        return counts.values().map(|number| (number / count).powi(2)).sum();
     }
+    let columns = (0..first.numbers().len()).map(|at| {
+        let values = || actions.iter().filter_map(move |action| action.numbers().get(at).map(|value| f64::from(*value)));
+        let average = mean(values()).unwrap_or_default();
+        2.0 * mean(values().map(|value| (value - average).powi(2))).unwrap_or_default()
+    });
+    columns.sum()
 }
 
 /// Returns the share of recorded discrete actions that a probe network predicts from observations, and from observations
@@ -159,24 +147,27 @@ fn chance(actions: &[&ActionValue]) -> f64 {
 fn probed(evidence: &Evidence) -> Option<(f64, f64)> {
     let set = evidence.recordings.as_ref()?;
     let episodes: Vec<&PlayedEpisode> = replayed_episodes(set).collect();
-    let actions = episodes.iter().flat_map(|episode| &episode.actions).filter_map(|action| match action {
-        ActionValue::Discrete(number) => Some(*number as usize + 1),
-        ActionValue::Continuous(_) => None,
-    });
-    let actions = actions.max()?;
+    let all = || episodes.iter().flat_map(|episode| &episode.actions);
+    // Combinations of several choices are numbered as they are found.
+    let combinations: BTreeMap<&[u32], usize> =
+        all().filter(|action| action.options().len() > 1).map(|action| action.options()).zip(std::iter::repeat(0)).collect();
+    let combinations: BTreeMap<&[u32], usize> = combinations.into_keys().zip(0..).collect();
+    let class = |action: &ActionValue| match action.options() {
+        [] => None,
+        [number] => Some(*number as usize),
+        several => combinations.get(several).copied(),
+    };
+    let actions = all().filter_map(class).max()? + 1;
     let steps = |is_asked: bool, with_state: bool| -> ProbeSteps {
         let chosen = episodes.iter().enumerate().filter(|(number, _)| (number % 4 == 3) == is_asked);
         let of_episode = |(_, episode): (usize, &&PlayedEpisode)| -> ProbeSteps {
             // The state before an action is the one after the tick before it.
             let rows = episode.rows().zip(&episode.actions).skip(1).zip(&episode.states);
-            rows.filter_map(|((row, action), state)| match action {
-                ActionValue::Discrete(number) => {
-                    let more = if with_state { state.as_slice() } else { &[] };
-                    Some(([row, more].concat(), *number as usize))
-                }
-                ActionValue::Continuous(_) => None,
-            })
-            .collect()
+            let labelled = rows.filter_map(|((row, action), state)| {
+                let more = if with_state { state.as_slice() } else { &[] };
+                Some(([row, more].concat(), class(action)?))
+            });
+            labelled.collect()
         };
         chosen.flat_map(of_episode).collect()
     };

@@ -2,7 +2,7 @@
 
 use crate::diagnose::play::PlayedEpisode;
 use bevy_playbot::{
-    action::{Action, ActionSpace, ActionValue},
+    action::{Action, ActionValue},
     agent::Control,
     engine::tick_world,
     fault::Fault,
@@ -12,7 +12,8 @@ use bevy_playbot::{
     state_hash::StateHash,
 };
 use playbot_harness::{
-    game::{Game, idle_action, is_named_idle},
+    game::{Game, idle_action},
+    single_actions::{SingleAction, single_actions},
     worlds::{build_world, hash_with_agent},
 };
 
@@ -28,7 +29,7 @@ const LATEST: usize = 120;
 pub struct ForcedAction {
     /// Its name.
     pub name: String,
-    /// The number of a discrete action, or of a continuous value.
+    /// The number of a discrete action, or its place among the options of all choices and then the numbers.
     pub number: u32,
     /// Moments in which it was tried.
     pub tried: usize,
@@ -82,24 +83,11 @@ pub fn force(game: &dyn Game, mode: &str, episode: &PlayedEpisode) -> Result<Vec
 
 /// Returns the actions to try: name, number, and the ways to take each.
 fn candidates(game: &dyn Game) -> Vec<(String, u32, Vec<ActionValue>)> {
-    let (names, idle) = (game.tools().input.action_names(), idle_action(game));
-    let name = |number: u32| names.get(number as usize).cloned().unwrap_or_else(|| format!("action {number}"));
-    match game.actions() {
-        ActionSpace::Discrete(count) => (0..count as u32)
-            .filter(|number| ActionValue::Discrete(*number) != idle && !is_named_idle(&names, *number))
-            .map(|number| (name(number), number, vec![ActionValue::Discrete(number)]))
-            .collect(),
-        ActionSpace::Continuous(count) => (0..count as u32)
-            .map(|number| {
-                let way = |value: f32| {
-                    let mut values = vec![0.0; count];
-                    values[number as usize] = value;
-                    ActionValue::Continuous(values)
-                };
-                (name(number), number, vec![way(1.0), way(-1.0)])
-            })
-            .collect(),
-    }
+    let doing = single_actions(game).into_iter().filter(|single| !single.is_idle);
+    let named = |SingleAction { name, number, ways, .. }| {
+        (name.unwrap_or_else(|| format!("action {number}")), number, ways)
+    };
+    doing.map(named).collect()
 }
 
 /// Returns the hashes of the ticks in which an action is held, after the beginning of an episode.

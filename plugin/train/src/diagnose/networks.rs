@@ -3,12 +3,13 @@
 use crate::diagnose::play::mean;
 use bevy_playbot::skill_prior::SkillPrior;
 use playbot_learner::{
-    ActionSpace, ActionValue, LearnError, ObsKind, Policy, PolicyOutput, Prior, SkillDraw, SkillModel, Streams,
+    ActionValue, LearnError, ObsKind, Policy, PolicyOutput, Prior, SkillDraw, SkillModel, Streams,
     rng::normal,
 };
 use std::{
     collections::BTreeMap,
     f64::consts::{E, PI},
+    ops::Range,
 };
 
 /// Most observations that networks are given, and skills for each.
@@ -104,36 +105,29 @@ pub fn probe_decoder(model: &SkillModel, steps: &[(&[f32], ActionValue)]) -> Res
     }
     let nll = mean(total.iter().map(|likelihood| -libm::log(likelihood.max(1e-30)))).unwrap_or_default();
     let actions: Vec<_> = steps.iter().map(|(_, action)| action).collect();
-    let margin = match model.action_space() {
-        ActionSpace::Discrete(_) => 0.05,
-        ActionSpace::Continuous(dim) => 0.5 * dim as f64,
-    };
+    let space = model.action_space();
+    let margin = 0.05 * space.choices().sizes().len() as f64 + 0.5 * space.numbers() as f64;
     Ok(Some(DecoderProbe { rows: count, nll, frequencies: marginal_entropy(&actions), margin }))
 }
 
-/// Returns the entropy of the frequencies of actions, or of a normal distribution with their mean and deviation.
+/// Returns the entropy of the frequencies of each choice, and of a normal distribution with the mean and deviation of
+/// each number.
 fn marginal_entropy(actions: &[&ActionValue]) -> f64 {
     let count = actions.len() as f64;
-    match actions.first() {
-        Some(ActionValue::Discrete(_)) | None => {
-            let mut counts = BTreeMap::<u32, f64>::new();
-            for action in actions {
-                if let ActionValue::Discrete(number) = action {
-                    *counts.entry(*number).or_default() += 1.0;
-                }
-            }
-            counts.values().map(|number| -number / count * libm::log(number / count)).sum()
+    let Some(first) = actions.first() else { return 0.0 };
+    let of_choice = |choice: usize| -> f64 {
+        let mut counts = BTreeMap::<u32, f64>::new();
+        for option in actions.iter().filter_map(|action| action.options().get(choice)) {
+            *counts.entry(*option).or_default() += 1.0;
         }
-        Some(ActionValue::Continuous(first)) => (0..first.len())
-            .map(|at| {
-                let values = actions.iter().filter_map(|action| match action {
-                    ActionValue::Continuous(values) => values.get(at).map(|value| f64::from(*value)),
-                    ActionValue::Discrete(_) => None,
-                });
-                0.5 * libm::log(2.0 * PI * E * variance(values).max(1e-6))
-            })
-            .sum(),
-    }
+        counts.values().map(|number| -number / count * libm::log(number / count)).sum()
+    };
+    let of_number = |at: usize| {
+        let values = actions.iter().filter_map(|action| action.numbers().get(at).map(|value| f64::from(*value)));
+        0.5 * libm::log(2.0 * PI * E * variance(values).max(1e-6))
+    };
+    let choices: f64 = (0..first.options().len()).map(of_choice).sum();
+    choices + (0..first.numbers().len()).map(of_number).sum::<f64>()
 }
 
 /// Returns some of the observations of the right length, evenly.
@@ -170,28 +164,26 @@ fn mean_spread(values: &[f32], width: usize) -> f64 {
 /// mean entropy. For normal distributions it is that of their spread, ½ ln(1 + var(means) / σ²).
 fn information(outputs: &[PolicyOutput], count: usize) -> f64 {
     let Some(first) = outputs.first() else { return 0.0 };
-    let dim = first.space.dim();
+    let (dim, options, numbers) = (first.space.dim(), first.space.options(), first.space.numbers());
+    let choices = first.space.choices();
     let entropy = |p: &[f64]| -> f64 { p.iter().filter(|p| **p > 0.0).map(|p| -p * libm::log(*p)).sum() };
+    let of_choice = |at: Range<usize>| -> f64 {
+        let each: Vec<Vec<f64>> = outputs
+            .iter()
+            .map(|output| output.head[at.clone()].iter().map(|log| libm::exp(f64::from(*log))).collect())
+            .collect();
+        let mixed: Vec<f64> =
+            (0..at.len()).map(|option| mean(each.iter().map(|p| p[option])).unwrap_or_default()).collect();
+        entropy(&mixed) - mean(each.iter().map(|p| entropy(p))).unwrap_or_default()
+    };
+    let of_number = |row: usize, number: usize| -> f64 {
+        let spread = variance(outputs.iter().map(|output| f64::from(output.head[row * dim + options + number])));
+        let sigma = first.log_std.get(row * numbers + number).copied().unwrap_or(0.0);
+        0.5 * libm::log1p(spread / libm::exp(2.0 * f64::from(sigma)))
+    };
     let of_row = |row: usize| -> f64 {
-        let at = row * dim..(row + 1) * dim;
-        match first.space {
-            ActionSpace::Discrete(_) => {
-                let each: Vec<Vec<f64>> = outputs
-                    .iter()
-                    .map(|output| output.head[at.clone()].iter().map(|log| libm::exp(f64::from(*log))).collect())
-                    .collect();
-                let mixed: Vec<f64> =
-                    (0..dim).map(|action| mean(each.iter().map(|p| p[action])).unwrap_or_default()).collect();
-                entropy(&mixed) - mean(each.iter().map(|p| entropy(p))).unwrap_or_default()
-            }
-            ActionSpace::Continuous(_) => at
-                .map(|index| {
-                    let spread = variance(outputs.iter().map(|output| f64::from(output.head[index])));
-                    let sigma = outputs.first().and_then(|output| output.log_std.get(index)).copied().unwrap_or(0.0);
-                    0.5 * libm::log1p(spread / libm::exp(2.0 * f64::from(sigma)))
-                })
-                .sum(),
-        }
+        let chosen: f64 = choices.ranges().map(|at| of_choice(row * dim + at.start..row * dim + at.end)).sum();
+        chosen + (0..numbers).map(|number| of_number(row, number)).sum::<f64>()
     };
     mean((0..count).map(of_row)).unwrap_or_default()
 }
@@ -199,6 +191,7 @@ fn information(outputs: &[PolicyOutput], count: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use playbot_learner::ActionSpace;
 
     fn output(head: Vec<f32>) -> PolicyOutput {
         let values = vec![0.0; head.len() / 2];

@@ -2,11 +2,8 @@
 
 use crate::diagnose::play::{PlayedEpisode, Replayed, replay};
 use bevy_playbot::{
-    action::ActionValue,
-    demo::{
-        file::{DemoEnd, DemoEpisode, DemoFileError, DemoReader, EpisodeActions},
-        replay::recorded_action,
-    },
+    action::{ActionValue, Actions},
+    demo::file::{DemoEnd, DemoEpisode, DemoFileError, DemoReader},
     engine::find_demos,
     vision::ObservationConfig,
 };
@@ -44,7 +41,7 @@ impl RecordedEpisode {
 
     /// Iterates over its actions.
     pub fn actions(&self) -> impl Iterator<Item = ActionValue> + '_ {
-        (0..self.episode.len()).filter_map(|tick| recorded_action(&self.episode.actions, tick))
+        self.episode.actions.iter()
     }
 
     /// Returns whether it was cut off at the end of the recording.
@@ -235,7 +232,7 @@ fn exchanged(game: &dyn Game, chosen: &[RecordedEpisode]) -> Result<Option<(u32,
 
 fn swapped(episode: &DemoEpisode, one: u32, other: u32) -> DemoEpisode {
     let mut changed = episode.clone();
-    if let EpisodeActions::Discrete(list) = &mut changed.actions {
+    if let Actions::Discrete(list) = &mut changed.actions {
         for action in list {
             *action = match *action {
                 action if action == one => other,

@@ -9,8 +9,8 @@ use crate::{
     experiment::file::parse_experiment,
 };
 use bevy_playbot::{
-    action::ActionValue,
-    demo::file::{DemoActions, DemoEnd, DemoEpisode, EpisodeActions},
+    action::{ActionSpace, ActionValue, Actions},
+    demo::file::{DemoEnd, DemoEpisode},
 };
 use std::{path::Path, sync::Arc};
 
@@ -36,8 +36,8 @@ pub fn played(seat: Seat, ticks: usize, tick: impl Fn(usize) -> (Vec<f32>, u32, 
 
 /// Returns four recordings of version 1 of a game, in which one action is taken, won or lost.
 pub fn recorded(action: u32, is_won: bool) -> RecordedSet {
-    let mut episode = DemoEpisode::new(0, DemoActions::Discrete(2));
-    episode.actions = EpisodeActions::Discrete(vec![action; 20]);
+    let mut episode = DemoEpisode::new(0, ActionSpace::Discrete(2));
+    episode.actions = Actions::Discrete(vec![action; 20]);
     (episode.rewards, episode.state_hashes) = (vec![0.0; 20], vec![1; 20]);
     episode.end = DemoEnd::Terminated { success: is_won };
     let recorded =

@@ -429,10 +429,8 @@ impl Experiment {
     fn sizes(&self, game: &dyn Game) -> Sizes {
         let kind: ObsKind = self.observation_config().obs_kind(game);
         let numbers = kind.numbers() as u64;
-        let (action, outputs) = match game.actions() {
-            ActionSpace::Discrete(choices) => (choices as u64, choices as u64),
-            ActionSpace::Continuous(dims) => (dims as u64, 2 * dims as u64),
-        };
+        let space = game.actions();
+        let (action, outputs) = (space.dim() as u64, (space.dim() + space.numbers()) as u64);
         let (image, observation, inputs) = match kind {
             ObsKind::Image(shape) => (Some(shape), numbers, 0),
             ObsKind::Vector(_) => (None, numbers.saturating_mul(4), numbers),

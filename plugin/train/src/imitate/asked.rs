@@ -5,7 +5,7 @@
 
 use bevy::prelude::*;
 use bevy_playbot::{
-    action::{Action, ActionSpace, ActionValue},
+    action::{Action, ActionSpace, ActionValue, MixedSpace},
     agent::{Agent, AgentOrder, Control},
     engine::{Renewal, TickSchedules, is_tick, tick_world},
     episode::{Episode, EpisodeEnded},
@@ -162,14 +162,17 @@ fn no_action(space: &ActionSpace) -> ActionValue {
     match space {
         ActionSpace::Discrete(_) => ActionValue::Discrete(u32::MAX),
         ActionSpace::Continuous(dim) => ActionValue::Continuous(vec![f32::NAN; *dim]),
+        ActionSpace::Mixed(MixedSpace { choices, numbers }) => ActionValue::Mixed {
+            choices: vec![u32::MAX; choices.sizes().len()],
+            numbers: vec![f32::NAN; *numbers],
+        },
     }
 }
 
 fn is_action(action: &ActionValue) -> bool {
-    match action {
-        ActionValue::Discrete(index) => *index != u32::MAX,
-        ActionValue::Continuous(values) => !values.iter().all(|value| value.is_nan()),
-    }
+    let (options, numbers) = (action.options(), action.numbers());
+    let is_chosen = options.is_empty() || options.iter().any(|&option| option != u32::MAX);
+    is_chosen && (numbers.is_empty() || numbers.iter().any(|number| !number.is_nan()))
 }
 
 /// Removes the actions of the last tick, so that a demonstrator without an answer is noticed.
@@ -222,7 +225,7 @@ fn label_all(world: &mut World, asking: &mut Asking) -> Result<(), String> {
         is_masked |= mask.is_some();
         match mask {
             Some(mask) => legal.extend_from_slice(mask.mask()),
-            None => legal.resize(legal.len() + spec.action_space.dim(), true),
+            None => legal.resize(legal.len() + spec.action_space.options(), true),
         }
         rows.push((place, entity, action.0.clone()));
     }
@@ -260,7 +263,7 @@ fn single(
     let mut steps = LabelledSteps::empty(spec);
     steps.obs.push(seen.row(row, spec.obs.numbers()))?;
     steps.actions.push(label)?;
-    let choices = spec.action_space.dim();
-    steps.legal = legal.get(row * choices..(row + 1) * choices).unwrap_or_default().to_vec();
+    let options = spec.action_space.options();
+    steps.legal = legal.get(row * options..(row + 1) * options).unwrap_or_default().to_vec();
     Ok(steps)
 }

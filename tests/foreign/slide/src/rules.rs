@@ -74,7 +74,7 @@ impl EpisodeWatcher for Watched {
 fn clicked(action: &ActionValue) -> Option<usize> {
     match action {
         ActionValue::Discrete(choice) => (*choice as usize).checked_sub(1).filter(|cell| *cell < CELLS),
-        ActionValue::Continuous(_) => None,
+        ActionValue::Continuous(_) | ActionValue::Mixed { .. } => None,
     }
 }
 

@@ -2,9 +2,8 @@
 
 use std::{fs, path::Path};
 
-use bevy_playbot::demo::file::{
-    Decider, DemoActions, DemoEnd, DemoEpisode, DemoHeader, DemoReader, DemoSummary, DemoWriter, EpisodeActions, repair,
-};
+use bevy_playbot::action::{ActionSpace, Actions};
+use bevy_playbot::demo::file::{Decider, DemoEnd, DemoEpisode, DemoHeader, DemoReader, DemoSummary, DemoWriter, repair};
 use bevy_playbot::level::LevelFile;
 use playbot::prelude::*;
 use playbot_test::findings::{FindingHead, StoredFinding};
@@ -49,7 +48,7 @@ fn walk(path: &Path) {
         observation_names: vec!["x".into(), "y".into()],
         demonstrator: "tester".into(),
         note: "drawn".into(),
-        ..DemoHeader::new("walk", 2, "easy", 60.0, DemoActions::Continuous(2))
+        ..DemoHeader::new("walk", 2, "easy", 60.0, ActionSpace::Continuous(2))
     };
     let mut writer = DemoWriter::create(path, header.with_level_files()).expect("fresh");
     for seed in 0..3 {
@@ -68,8 +67,8 @@ fn walked_episode(seed: u8) -> DemoEpisode {
         deciders: ticks().map(|tick| deciders[usize::from(tick) % deciders.len()]).collect(),
         end: DemoEnd::Truncated,
         observations: pairs().collect(),
-        actions: EpisodeActions::Continuous { dim: 2, values: pairs().collect() },
-        ..DemoEpisode::new(seed.into(), DemoActions::Continuous(2))
+        actions: Actions::Continuous { dim: 2, values: pairs().collect() },
+        ..DemoEpisode::new(seed.into(), ActionSpace::Continuous(2))
     }
 }
 
@@ -84,7 +83,7 @@ fn finding() -> StoredFinding {
         ..FindingHead::new("plain:7", "stuck", "it stands still")
     };
     let episode = DemoEpisode {
-        actions: EpisodeActions::Discrete(vec![2; ticks]),
+        actions: Actions::Discrete(vec![2; ticks]),
         rewards: vec![0.0; ticks],
         state_hashes: vec![3; ticks],
         deciders: vec![Decider::Bot; ticks],

@@ -7,7 +7,8 @@ use crate::{
     output::print_line,
 };
 use bevy_playbot::{
-    demo::file::{Decider, DemoActions, DemoEnd, DemoEpisode, DemoHeader, DemoReader, EpisodeActions},
+    action::{ActionSpace, Actions},
+    demo::file::{Decider, DemoEnd, DemoEpisode, DemoHeader, DemoReader},
     level::LevelFile,
 };
 use playbot_harness::{game::Game, games::Games};
@@ -113,8 +114,12 @@ fn show_header(header: &DemoHeader) -> Result<(), CliError> {
 fn noise(header: &DemoHeader) -> String {
     match header.actions {
         _ if header.action_noise == 0.0 => "none".to_owned(),
-        DemoActions::Discrete(_) => format!("{:.0} % of the actions are random", 100.0 * header.action_noise),
-        DemoActions::Continuous(_) => format!("normal, with a standard deviation of {}", header.action_noise),
+        ActionSpace::Discrete(_) => format!("{:.0} % of the actions are random", 100.0 * header.action_noise),
+        ActionSpace::Continuous(_) => format!("normal, with a standard deviation of {}", header.action_noise),
+        ActionSpace::Mixed(_) => {
+            let noise = header.action_noise;
+            format!("{:.0} % of the choices are random, numbers have a standard deviation of {noise}", 100.0 * noise)
+        }
     }
 }
 
@@ -182,8 +187,12 @@ fn show_ticks(episode: &DemoEpisode, ticks: TickRange, names: &[String], as_json
         let (reward, hash, decider) = (episode.rewards[tick], episode.state_hashes[tick], episode.deciders[tick]);
         if as_json {
             let (action, name) = match &episode.actions {
-                EpisodeActions::Discrete(list) => (json!(list[tick]), names.get(list[tick] as usize)),
-                EpisodeActions::Continuous { dim, values } => (json!(values[tick * dim..(tick + 1) * dim]), None),
+                Actions::Discrete(list) => (json!(list[tick]), names.get(list[tick] as usize)),
+                Actions::Continuous { .. } => (json!(episode.actions.vector(tick)), None),
+                Actions::Mixed { .. } => {
+                    let (choices, numbers) = (episode.actions.chosen(tick), episode.actions.vector(tick));
+                    (json!({"choices": choices, "numbers": numbers}), None)
+                }
             };
             let mut row = json!({
                 "tick": tick, "action": action, "reward": reward, "state_hash": hash, "decider": decider,
@@ -200,18 +209,23 @@ fn show_ticks(episode: &DemoEpisode, ticks: TickRange, names: &[String], as_json
 }
 
 /// Describes the action of a tick by its number or numbers, with their names where they are known.
-fn action_in_words(actions: &EpisodeActions, tick: usize, names: &[String]) -> String {
+fn action_in_words(actions: &Actions, tick: usize, names: &[String]) -> String {
     let named = |index: usize| names.get(index).filter(|name| !name.is_empty());
     match actions {
-        EpisodeActions::Discrete(list) => {
+        Actions::Discrete(list) => {
             let number = list[tick];
             named(number as usize).map_or_else(|| number.to_string(), |name| format!("{number} {name}"))
         }
-        EpisodeActions::Continuous { dim, values } => {
-            let row = values[tick * dim..(tick + 1) * dim].iter().enumerate();
+        Actions::Continuous { .. } => {
+            let row = actions.vector(tick).iter().enumerate();
             let words =
                 row.map(|(at, value)| named(at).map_or_else(|| value.to_string(), |name| format!("{name} {value}")));
             format!("[{}]", words.collect::<Vec<_>>().join(", "))
+        }
+        Actions::Mixed { .. } => {
+            let options = actions.chosen(tick).iter().map(u32::to_string);
+            let words: Vec<_> = options.chain(actions.vector(tick).iter().map(f32::to_string)).collect();
+            format!("[{}]", words.join(", "))
         }
     }
 }
@@ -234,16 +248,16 @@ mod tests {
     #[test]
     fn actions_have_the_names_that_are_known() {
         let names = ["left", "", "jump"].map(str::to_owned);
-        let discrete = EpisodeActions::Discrete(vec![0, 1, 2, 3]);
+        let discrete = Actions::Discrete(vec![0, 1, 2, 3]);
         let words = [0, 1, 2, 3].map(|tick| action_in_words(&discrete, tick, &names));
         assert_eq!(words, ["0 left", "1", "2 jump", "3"]);
-        let values = EpisodeActions::Continuous { dim: 2, values: vec![0.5, -1.0, 0.0, 1.0] };
+        let values = Actions::Continuous { dim: 2, values: vec![0.5, -1.0, 0.0, 1.0] };
         assert_eq!(action_in_words(&values, 1, &names[..1]), "[left 0, 1]");
     }
 
     #[test]
     fn noise_and_observations_are_plain_words() {
-        let header = DemoHeader::new("runner", 1, "easy", 60.0, DemoActions::Discrete(3));
+        let header = DemoHeader::new("runner", 1, "easy", 60.0, ActionSpace::Discrete(3));
         assert_eq!(noise(&header), "none");
         assert!(observations(&header).starts_with("not kept"), "{}", observations(&header));
         let names = vec!["x".to_owned(), "y".to_owned()];
@@ -252,7 +266,7 @@ mod tests {
             (noise(&header).as_str(), observations(&header).as_str()),
             ("20 % of the actions are random", "2 values: x, y")
         );
-        let header = DemoHeader { actions: DemoActions::Continuous(2), ..header };
+        let header = DemoHeader { actions: ActionSpace::Continuous(2), ..header };
         assert_eq!(noise(&header), "normal, with a standard deviation of 0.2");
     }
 }

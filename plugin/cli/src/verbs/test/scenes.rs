@@ -9,7 +9,7 @@ use crate::{
     verbs::replay::picture::{film, play, seen_as},
 };
 use bevy_playbot::{
-    demo::file::{DemoEnd, EpisodeActions},
+    demo::file::DemoEnd,
     vision::{ObservationConfig, ObservationKind},
 };
 use indicatif::ProgressBar;
@@ -153,10 +153,7 @@ fn up_to(finding: &StoredFinding, ticks: usize) -> StoredFinding {
     let episode = &mut cut.episode;
     // Columns of an observation. An episode without ticks has no observations.
     let columns = episode.observations.len() / episode.len().max(1);
-    match &mut episode.actions {
-        EpisodeActions::Discrete(actions) => actions.truncate(ticks),
-        EpisodeActions::Continuous { dim, values } => values.truncate(ticks.saturating_mul(*dim)),
-    }
+    episode.actions.truncate(ticks);
     episode.rewards.truncate(ticks);
     episode.state_hashes.truncate(ticks);
     episode.deciders.truncate(ticks);
@@ -210,7 +207,10 @@ impl Drop for SceneMaker<'_> {
 mod tests {
     use super::*;
     use bevy::prelude::*;
-    use bevy_playbot::demo::file::{Decider, DemoEpisode};
+    use bevy_playbot::{
+        action::Actions,
+        demo::file::{Decider, DemoEpisode},
+    };
     use playbot_harness::foreign::ForeignGame;
     use playbot_test::findings::FindingHead;
 
@@ -234,7 +234,7 @@ mod tests {
     fn stored(game: &dyn Game, message: &str) -> StoredFinding {
         let header = game.demo_header("default");
         let mut episode = DemoEpisode::new(0, header.actions);
-        episode.actions = EpisodeActions::Discrete(vec![0; TICKS]);
+        episode.actions = Actions::Discrete(vec![0; TICKS]);
         (episode.rewards, episode.state_hashes) = (vec![0.0; TICKS], vec![0; TICKS]);
         episode.deciders = vec![Decider::Bot; TICKS];
         let head = FindingHead { tick: Some(TICKS as u32 - 1), ..FindingHead::new("default:0", "stuck", message) };
@@ -261,11 +261,11 @@ mod tests {
         }
         // Numbers of actions that are no choices are cut with their ticks.
         let mut many = stored(&game, "it stays");
-        many.episode.actions = EpisodeActions::Continuous { dim: 2, values: vec![0.5; 2 * TICKS] };
+        many.episode.actions = Actions::Continuous { dim: 2, values: vec![0.5; 2 * TICKS] };
         many.episode.observations = vec![0.0; 3 * TICKS];
         let cut = up_to(&many, 7).episode;
         assert_eq!((cut.len(), cut.observations.len(), cut.rewards.len(), cut.deciders.len()), (7, 21, 7, 7));
-        assert_eq!(cut.actions, EpisodeActions::Continuous { dim: 2, values: vec![0.5; 14] });
+        assert_eq!(cut.actions, Actions::Continuous { dim: 2, values: vec![0.5; 14] });
     }
 
     #[test]

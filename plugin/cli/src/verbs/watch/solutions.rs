@@ -4,7 +4,6 @@ use crate::error::CliError;
 use bevy_playbot::{
     action::ActionValue,
     demo::file::{DemoReader, DemoWriter},
-    engine::recorded_action,
     state_hash::StateHash,
 };
 use playbot_harness::{game::Game, split::LevelSplit};
@@ -34,7 +33,7 @@ impl<'a> Solutions<'a> {
             return None;
         }
         let episode = reader.next()?.ok()?;
-        let actions: Vec<ActionValue> = (0..).map_while(|tick| recorded_action(&episode.actions, tick)).collect();
+        let actions: Vec<ActionValue> = episode.actions.iter().collect();
         // Another version of the game may have other actions.
         let mut fitting = Actions::empty(&self.game.actions());
         let fits = actions.iter().all(|action| fitting.push(action).is_ok());

@@ -1,7 +1,7 @@
 //! Tests against the loss as a graph of tensors.
 
 use crate::{
-    DeviceKind,
+    ActionSpace, DeviceKind,
     legal::logit_offsets,
     nn::{ActionBatch, matrix, vector},
     policy::NetInput,
@@ -12,19 +12,20 @@ use crate::{
     rng::{ChaCha8Rng, Streams, normal},
     score::{ScoreConfig, TeacherBatch},
 };
-use burn::tensor::Device;
+use burn::tensor::{Device, Gradients};
 use rand::RngExt;
 
 fn numbers(rng: &mut ChaCha8Rng, n: usize, scale: f32) -> Vec<f32> {
     (0..n).map(|_| normal(rng) * scale).collect()
 }
 
-/// Returns a policy or decoder: choices, or a Gaussian with ln σ for all rows or for each.
+/// Returns a policy or decoder: choices, a Gaussian with ln σ for all rows or for each, or two choices and a vector.
 fn dist(rng: &mut ChaCha8Rng, kind: u8, n: usize, dim: usize, device: &Device) -> Dist {
     let head = matrix(numbers(rng, n * dim, 0.7), n, dim, device);
     let std_rows = if kind == 1 { 1 } else { n };
     match kind {
         0 => Dist::categorical(head),
+        3 => Dist::Joint(vec![dist(rng, 0, n, dim, device), dist(rng, 0, n, 3, device), dist(rng, 1, n, 2, device)]),
         _ => Dist::Gaussian { mean: head, log_std: matrix(numbers(rng, std_rows * dim, 0.3), std_rows, dim, device) },
     }
 }
@@ -35,17 +36,22 @@ fn tracked(dist: Dist) -> Dist {
         Dist::Gaussian { mean, log_std } => {
             Dist::Gaussian { mean: mean.require_grad(), log_std: log_std.require_grad() }
         }
+        Dist::Joint(parts) => Dist::Joint(parts.into_iter().map(tracked).collect()),
     }
 }
 
 /// Returns the gradients by all numbers of the distribution and by the values, where there are any.
 fn gradients(loss: Tensor<1>, dist: &Dist, values: &Tensor<1>) -> Vec<Option<Vec<f32>>> {
+    fn of_parts(dist: &Dist, grads: &Gradients) -> Vec<Option<Vec<f32>>> {
+        let of = |grad: Option<Tensor<2>>| grad.map(|grad| host(grad).expect("readable"));
+        match dist {
+            Dist::Categorical { log_probs } => vec![of(log_probs.grad(grads))],
+            Dist::Gaussian { mean, log_std } => vec![of(mean.grad(grads)), of(log_std.grad(grads))],
+            Dist::Joint(parts) => parts.iter().flat_map(|part| of_parts(part, grads)).collect(),
+        }
+    }
     let grads = loss.backward();
-    let of = |grad: Option<Tensor<2>>| grad.map(|grad| host(grad).expect("readable"));
-    let mut all = match dist {
-        Dist::Categorical { log_probs } => vec![of(log_probs.grad(&grads))],
-        Dist::Gaussian { mean, log_std } => vec![of(mean.grad(&grads)), of(log_std.grad(&grads))],
-    };
+    let mut all = of_parts(dist, &grads);
     all.push(values.grad(&grads).map(|grad| host(grad).expect("readable")));
     all
 }
@@ -56,15 +62,21 @@ fn close(got: f64, want: f64) -> bool {
 
 #[test]
 fn loss_metrics_and_gradient_are_those_of_the_tensors() {
-    for case in 0..96 {
+    for case in 0..128 {
         let device = DeviceKind::Flex.plain();
         let mut rng = Streams::new(7).stream("loss", case);
-        let (kind, n, dim) = ((case % 3) as u8, rng.random_range(1..150), rng.random_range(1..17));
+        let (kind, n, dim) = ((case % 4) as u8, rng.random_range(1..150), rng.random_range(1..17));
         let [penalised, from_policy, clip_value] = [(); 3].map(|()| rng.random::<bool>());
         let policy = tracked(dist(&mut rng, kind, n, dim, &device.clone().autodiff()));
         let decoder = dist(&mut rng, kind, n, dim, &device);
         let actions = match kind {
             0 => Actions::Discrete((0..n).map(|i| (i % dim) as u32).collect()),
+            3 => Actions::Mixed {
+                choices: 2,
+                options: (0..n).flat_map(|i| [i % dim, i % 3].map(|option| option as u32)).collect(),
+                dim: 2,
+                values: numbers(&mut rng, n * 2, 1.0),
+            },
             _ => Actions::Continuous { dim, values: numbers(&mut rng, n * dim, 1.0) },
         };
         let actions = ActionBatch::new(&actions, &device);
@@ -179,7 +191,8 @@ fn the_loss_under_a_mask_is_that_of_the_legal_choices_alone() {
     let more = fewer.clone().map(|logits| logits.chunks(2).flat_map(|row| [row[0], 9.0, row[1]]).collect::<Vec<f32>>());
     let columns = [0.2, 1.0, 0.3, 1.0, 0.5, 0.3].map(|scale| numbers(&mut rng, n, scale));
     let rows: Vec<usize> = (0..n).collect();
-    let offsets = logit_offsets(&[true, false, true].repeat(n), &rows, 3, &device).expect("a mask");
+    let offsets =
+        logit_offsets(&[true, false, true].repeat(n), &rows, &ActionSpace::Discrete(3), &device).expect("a mask");
     let actions = |step: u32| (0..n as u32).map(|row| row % 2 * step).collect::<Vec<u32>>();
     let (want, want_grads) = penalised(fewer, None, actions(1), &columns);
     let (got, grads) = penalised(more, Some(&offsets), actions(2), &columns);

@@ -114,7 +114,7 @@ impl Moves {
     pub(super) fn idle(&self) -> ActionValue {
         match self.space {
             ActionSpace::Discrete(_) => ActionValue::Discrete(self.idle),
-            ActionSpace::Continuous(count) => ActionValue::Continuous(vec![0.0; count]),
+            ActionSpace::Continuous(_) | ActionSpace::Mixed(_) => self.space.first(),
         }
     }
 
@@ -132,6 +132,17 @@ impl Moves {
                 *values.get_mut(at)? = 0.0;
                 Some(ActionValue::Continuous(values))
             }
+            // The n-th choice stays at its first option, or the n-th number behind them at 0.
+            ActionValue::Mixed { choices, numbers } => {
+                let (mut choices, mut numbers) = (choices.clone(), numbers.clone());
+                let at = n % (choices.len() + numbers.len()).max(1);
+                match choices.get_mut(at) {
+                    Some(option) => *option = 0,
+                    None => *numbers.get_mut(at - choices.len())? = 0.0,
+                }
+                let without = ActionValue::Mixed { choices, numbers };
+                (without != *action).then_some(without)
+            }
         }
     }
 
@@ -140,7 +151,8 @@ impl Moves {
     pub(super) fn is_farming(&self, action: &ActionValue) -> bool {
         match action {
             ActionValue::Discrete(choice) => *choice == self.idle,
-            ActionValue::Continuous(values) => values.first().is_some_and(|value| *value > 0.5),
+            ActionValue::Mixed { choices, .. } if !choices.is_empty() => choices.iter().all(|&option| option == 0),
+            ActionValue::Continuous(values) | ActionValue::Mixed { numbers: values, .. } => values.first().is_some_and(|value| *value > 0.5),
         }
     }
 }

@@ -109,12 +109,15 @@ impl History {
     }
 }
 
-/// Reduces an action to the choice, or to the direction of the first value, since continuous values never repeat
+/// Reduces an action to the choice or choices, or to the direction of the first value, since continuous values never repeat
 /// exactly.
 fn push(action: &ActionValue) -> i64 {
     match action {
         ActionValue::Discrete(choice) => i64::from(*choice),
-        ActionValue::Continuous(values) => {
+        ActionValue::Mixed { choices, .. } if !choices.is_empty() => {
+            choices.iter().fold(0, |all, &option| all * 1000 + i64::from(option))
+        }
+        ActionValue::Continuous(values) | ActionValue::Mixed { numbers: values, .. } => {
             values.first().map_or(0, |value| i64::from(*value > 0.0) - i64::from(*value < 0.0))
         }
     }

@@ -122,7 +122,7 @@ impl EpisodeWatcher for Watched {
 fn way(action: &ActionValue) -> Option<IVec2> {
     match action {
         ActionValue::Discrete(choice) => WAYS.get((*choice as usize).checked_sub(1)?).map(|(_, way)| *way),
-        ActionValue::Continuous(_) => None,
+        ActionValue::Continuous(_) | ActionValue::Mixed { .. } => None,
     }
 }
 
