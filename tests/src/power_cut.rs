@@ -197,6 +197,21 @@ impl Contents {
     }
 }
 
+/// Checks the work after each power cut, on two threads: each has files of its own.
+///
+/// # Panics
+/// If a check does.
+pub fn after_each(cuts: &[PowerCut], check: impl Fn(&PowerCut) + Sync) {
+    let (half, rest) = cuts.split_at(cuts.len() / 2);
+    std::thread::scope(|scope| {
+        let other = scope.spawn(|| half.iter().for_each(&check));
+        rest.iter().for_each(&check);
+        if let Err(panic) = other.join() {
+            std::panic::resume_unwind(panic);
+        }
+    });
+}
+
 #[cfg(test)]
 mod tests {
     use std::io::Write as _;

@@ -8,7 +8,7 @@ use playbot_learner::{
 };
 use playbot_tests::{
     Corridor,
-    power_cut::{PaperDisk, PowerCut, distinct_power_cuts},
+    power_cut::{PaperDisk, PowerCut, after_each, distinct_power_cuts},
     training::{run_info, train, written},
 };
 use playbot_train::{
@@ -97,12 +97,12 @@ fn a_training_goes_on_to_the_same_bytes_wherever_the_power_failed() {
     let (undisturbed, files) = (written(&run), tree(folder.path()));
     let cuts = distinct_power_cuts(&PaperDisk::default(), &operations);
     assert!(cuts.len() > 300, "{} states", cuts.len());
-    for cut in &cuts {
+    after_each(&cuts, |cut| {
         let left = tempfile::tempdir().expect("a folder");
         PaperDisk::default().after(&operations, cut).write(folder.path(), left.path());
         let run = left.path().join("run");
         go_on(&run, &operations, cut);
         assert!(written(&run) == undisturbed, "{cut:?} after {:?}", operations[..cut.operations].last());
         assert_eq!(tree(left.path()), files, "{cut:?}: something is left over");
-    }
+    });
 }

@@ -9,7 +9,7 @@ use playbot_learner::{
 };
 use playbot_tests::{
     Corridor,
-    power_cut::{PaperDisk, distinct_power_cuts},
+    power_cut::{PaperDisk, after_each, distinct_power_cuts},
     small,
     training::{run_info, train, written},
 };
@@ -108,11 +108,11 @@ fn a_study_comes_to_the_same_result_wherever_the_power_failed() {
     let (operations, undisturbed, files) = (recording.operations(), files_of(folder.path()), tree(folder.path()));
     let cuts = distinct_power_cuts(&PaperDisk::default(), &operations);
     assert!(cuts.len() > 100, "{} states", cuts.len());
-    for cut in &cuts {
+    after_each(&cuts, |cut| {
         let left = tempfile::tempdir().expect("a folder");
         PaperDisk::default().after(&operations, cut).write(folder.path(), left.path());
         study(left.path());
         assert!(files_of(left.path()) == undisturbed, "{cut:?} after {:?}", operations[..cut.operations].last());
         assert_eq!(tree(left.path()), files, "{cut:?}: something is left over");
-    }
+    });
 }
