@@ -19,6 +19,9 @@ const RECENT: usize = 5;
 const HIGHEST_RATE: f64 = 0.02;
 /// Learning rates and gradients under which nothing is learned in any number of steps.
 const LOWEST_RATE: f64 = 1e-7;
+/// Passes over a rollout from which on they are too many whatever the metrics say: ten times the usual number.
+const MOST_PASSES: usize = 30;
+
 /// Bounds of a mean KL divergence and clip share in an update. Schulman et al. (2017) aim at 0.003 to 0.03.
 const LARGEST_KL: f64 = 0.5;
 const LARGEST_CLIP_SHARE: f64 = 0.6;
@@ -87,6 +90,15 @@ fn settings(experiment: &Experiment, tag: &Tag<'_>) -> Vec<LearningFinding> {
             &[Advice::LowerRate],
         ));
     }
+    if is_ppo && ppo.epochs >= MOST_PASSES {
+        let clipped = tag("clip_fraction").last().map_or("an unknown share".to_owned(), |(_, share)| readable(*share));
+        found.push(LearningFinding::new(
+            Sign::MovesTooFar,
+            format!("`ppo.epochs` is {}, and {clipped} of the actions are clipped in the last update", ppo.epochs),
+            "each rollout is learned from until the policy fits what was chance in it",
+            &[Advice::FewerPasses],
+        ));
+    }
     if is_ppo && *algorithm != Algorithm::SpirlPpo && ppo.ent_coef >= LARGEST_ENTROPY_WEIGHT {
         found.push(LearningFinding::new(
             Sign::EntropyWeight,
@@ -141,7 +153,7 @@ fn steps_of_policy(experiment: &Experiment, tag: &Tag<'_>, is_solved: bool) -> V
                 }
             };
             found.push(LearningFinding::new(Sign::Unmoved, evidence, cause, &advice));
-        } else if !is_solved && (kl > LARGEST_KL || clip > LARGEST_CLIP_SHARE) {
+        } else if !is_solved && ppo.epochs < MOST_PASSES && (kl > LARGEST_KL || clip > LARGEST_CLIP_SHARE) {
             let cause = format!("`ppo.lr` = {} or `ppo.epochs` = {} is too much", readable(ppo.lr), ppo.epochs);
             found.push(LearningFinding::new(
                 Sign::MovesTooFar,
@@ -329,6 +341,9 @@ mod tests {
         let solved = [("losses/approx_kl", 0.0), ("losses/clip_fraction", 0.0), (SUCCESS_RATE, 0.99)];
         assert_eq!(signs(&ppo, &solved), [], "it has nothing to learn");
         assert_eq!(signs(&ppo, &[("losses/approx_kl", 2.0)]), [Sign::MovesTooFar]);
+        let many = experiment("ppo", "ppo: (epochs: 40)");
+        assert_eq!(signs(&many, &[(SUCCESS_RATE, 0.99)]), [Sign::MovesTooFar], "it may have been lucky");
+        assert_eq!(signs(&many, &[("losses/approx_kl", 2.0)]), [Sign::MovesTooFar], "it is said once");
         let far = [("losses/explained_variance", -3.0), ("losses/value_loss", 9.0)];
         assert_eq!(signs(&ppo, &far), [Sign::BlindCritic]);
         assert_eq!(signs(&ppo, &[("losses/explained_variance", -3.0)]), [], "hardly anything is paid");
