@@ -29,6 +29,9 @@ const OVER_ACTIONS: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO, Reader::SPIRL_
 /// Those of them whose policy chooses an action in each tick, which may remember and be curious.
 const IN_EACH_TICK: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO];
 
+/// Readers whose policy acts in each tick itself, and not through skills.
+const REMEMBERING: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO, Reader::IMITATION];
+
 settings! {
     /// Hyperparameters of PPO. The defaults are those of the paper's CoinRun runs, with 64 environments in mind.
     #[derive(Clone, PartialEq, Debug)]
@@ -78,7 +81,7 @@ settings! {
     norm_obs: bool = false, by NETWORKS;
     /// The memory of actor and critic. A policy that starts as a copy of the decoder has one that is without effect at
     /// first. `sequence` ticks are trained together, and `burn_in` is explained with them.
-    memory: MemoryKind = MemoryKind::None, in Range::COUNT, by IN_EACH_TICK, such as "Gru(hidden: 128)", off "settings::is_off";
+    memory: MemoryKind = MemoryKind::None, in Range::COUNT, by REMEMBERING, such as "Gru(hidden: 128)", off "settings::is_off";
     /// Hidden layers of actor and critic. A copied decoder brings its own.
     hidden: Vec<usize> = vec![200, 200], in Range::COUNT, by NETWORKS;
     /// The function after each hidden layer.

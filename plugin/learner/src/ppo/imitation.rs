@@ -1,19 +1,23 @@
 //! Imitation: the policy is fitted to labelled observations, by the likelihood of the labels.
 
 use crate::{
-    Actions, FileError, LearnError, LearnerMetrics, ObsKind, Observations, PolicySpec, SettingError,
+    Actions, FileError, LearnError, Learner, LearnerMetrics, MemoryKind, ObsKind, Observations, Policy, PolicySpec,
+    Rollout,
     device::update_on,
     file::{FileKind, TensorFile},
     legal::logit_offsets,
     nn::{ActionBatch, NamedGrads, ParamVisitor, Parameters, finite},
-    policy::{InputBuilder, LogStd},
-    ppo::PpoLearner,
-    rng::shuffle,
+    policy::{InputBuilder, LogStd, Recall},
+    ppo::{
+        PpoLearner,
+        sequences::{Sequence, recall, rows_of, sequences},
+    },
+    rng::{ChaCha8Rng, shuffle},
     settings,
     settings::{Range, Reader},
     skill::{Dataset, DatasetEpisode},
 };
-use burn::tensor::Tensor;
+use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -64,6 +68,9 @@ pub struct LabelledSteps {
     pub actions: Actions,
     /// Masks of the actions, row-major; empty if all are legal.
     pub legal: Vec<bool>,
+    /// The rows that begin an episode, in ascending order. Rows up to the next one follow each other tick by tick. Empty
+    /// if that is not known, and then no policy with memory can learn from them.
+    pub begins: Vec<usize>,
 }
 
 const FILE: FileKind = FileKind { name: "labelled steps", version: 1 };
@@ -74,12 +81,20 @@ struct Header {
     spec: PolicySpec,
     rows: usize,
     is_masked: bool,
+    /// Rows that begin an episode; the first files had none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    begins: Vec<usize>,
 }
 
 impl LabelledSteps {
     /// Creates an empty set for policies of `spec`.
     pub fn empty(spec: &PolicySpec) -> Self {
-        Self { obs: Observations::empty(&spec.obs), actions: Actions::empty(&spec.action_space), legal: Vec::new() }
+        Self {
+            obs: Observations::empty(&spec.obs),
+            actions: Actions::empty(&spec.action_space),
+            legal: Vec::new(),
+            begins: Vec::new(),
+        }
     }
 
     /// Returns all steps of recordings, labelled by the recorded actions.
@@ -92,7 +107,8 @@ impl LabelledSteps {
         for (number, episode) in dataset.episodes.iter().enumerate() {
             let legal = dataset.legal.get(number).map_or(Vec::new(), |legal| legal.to_vec());
             let DatasetEpisode { observations, actions } = &**episode;
-            all.extend(&Self { obs: observations.clone(), actions: actions.clone(), legal }, &spec)?;
+            let begins = if actions.is_empty() { Vec::new() } else { vec![0] };
+            all.extend(&Self { obs: observations.clone(), actions: actions.clone(), legal, begins }, &spec)?;
         }
         Ok(all)
     }
@@ -116,6 +132,7 @@ impl LabelledSteps {
         self.obs.push(more.obs.as_slice())?;
         self.actions.extend_rows(&more.actions, 0, rows)?;
         crate::legal::extend(&mut self.legal, before, &more.legal, rows, spec.action_space.options());
+        self.begins.extend(more.begins.iter().map(|row| before + row));
         Ok(())
     }
 
@@ -124,7 +141,8 @@ impl LabelledSteps {
     /// # Errors
     /// [`FileError::Io`] if it cannot be written.
     pub fn save(&self, path: &Path, spec: &PolicySpec) -> Result<(), FileError> {
-        let header = Header { spec: *spec, rows: self.len(), is_masked: !self.legal.is_empty() };
+        let (is_masked, begins) = (!self.legal.is_empty(), self.begins.clone());
+        let header = Header { spec: *spec, rows: self.len(), is_masked, begins };
         let mut file = TensorFile::new(path, FILE, &header)?;
         match &self.obs {
             Observations::Vector(values) => file.put("obs", &[values.len()], values),
@@ -155,6 +173,10 @@ impl LabelledSteps {
             return Err(file.format(format!("its steps are of {:?}, and {spec:?} is needed", header.spec)));
         }
         let (rows, space) = (header.rows, spec.action_space);
+        let is_ordered = header.begins.is_sorted_by(|one, other| one < other);
+        if !is_ordered || header.begins.last().is_some_and(|&row| row >= rows) {
+            return Err(file.format("its episodes do not begin in ascending rows".to_owned()));
+        }
         let product = |of: &TensorFile, what: &str, width: usize| match rows {
             0 => Ok(0),
             rows => of.product(what, &[rows, width]),
@@ -179,7 +201,7 @@ impl LabelledSteps {
         let of_mask = product(&file, "legal", space.options())?;
         let legal = if header.is_masked { file.take_flags("legal", of_mask)? } else { Vec::new() };
         file.finish()?;
-        Ok(Self { obs, actions, legal })
+        Ok(Self { obs, actions, legal, begins: header.begins })
     }
 }
 
@@ -214,10 +236,6 @@ impl PpoLearner {
         config: &ImitationConfig,
     ) -> Result<LearnerMetrics, LearnError> {
         let (spec, n) = (self.base.spec, steps.len());
-        if self.nets.actor.memory.is_some() {
-            let why = "is for ppo and score-ppo, not for imitation: leave it `None`";
-            return Err(SettingError::new("ppo.memory", why).into());
-        }
         if n == 0 {
             return Err(LearnError::Config("there are no labelled steps to imitate".to_owned()));
         }
@@ -235,12 +253,17 @@ impl PpoLearner {
         let inputs =
             InputBuilder { z: &[], latent: 0, obs: steps.obs.as_slice(), kind: &spec.obs, stats: stats.as_deref() };
         let mut rng = self.base.streams.stream("imitation.minibatches", self.base.updates);
-        let mut order: Vec<usize> = (0..n).collect();
+        let mut order = Order::new(steps, spec, self.config.memory)?;
         let (mut last_pass, mut norms, mut count) = (0.0, 0.0, 0.0);
         for pass in 0..config.epochs {
-            shuffle(&mut order, &mut rng);
-            for rows in order.chunks(config.batch) {
-                let features = self.nets.actor.join(&inputs.input(rows, &device))?;
+            if let Order::Sequences { played, .. } = &mut order {
+                played.memory = remembered(&self.policy(), steps)?;
+            }
+            for minibatch in order.minibatches(config.batch, &mut rng) {
+                let rows = &minibatch.rows[..];
+                let recall = order.recall(&minibatch, &inputs, &device);
+                let joined = self.nets.actor.join(&inputs.input(rows, &device))?;
+                let features = self.nets.actor.recall(joined, recall.as_ref())?;
                 let offsets = logit_offsets(&steps.legal, rows, &spec.action_space, &device);
                 let dist = self.nets.actor.forward_legal(features, offsets.as_ref());
                 let labels = ActionBatch::new(&steps.actions.gather(rows), &device);
@@ -265,6 +288,102 @@ impl PpoLearner {
             ("imitation/labelled_steps", n as f64),
         ]))
     }
+}
+
+// The order in which labelled steps are learned from.
+
+/// A minibatch: its rows, and the sequences that they are for a policy with memory.
+struct Labelled {
+    rows: Vec<usize>,
+    sequences: Vec<Sequence>,
+}
+
+/// The rows of labelled steps, for minibatches.
+#[derive(Debug)]
+enum Order {
+    /// Each by itself.
+    Rows(Vec<usize>),
+    /// Sequences of so many ticks, for a policy with memory.
+    Sequences {
+        all: Vec<Sequence>,
+        ticks: usize,
+        /// The steps as a rollout of one environment, with what is remembered before each.
+        played: Box<Rollout>,
+    },
+}
+
+impl Order {
+    /// # Errors
+    /// [`LearnError::Config`] if the policy remembers and the episodes of the steps are not known.
+    fn new(steps: &LabelledSteps, spec: PolicySpec, memory: MemoryKind) -> Result<Self, LearnError> {
+        let n = steps.len();
+        let Some((ticks, _)) = memory.sequences() else { return Ok(Self::Rows((0..n).collect())) };
+        if steps.begins.first() != Some(&0) {
+            let why = "a policy that remembers is imitated from whole episodes, and the labelled steps do not say where \
+                       theirs begin: leave `ppo.memory` at `None`, or record and label anew";
+            return Err(LearnError::Config(why.to_owned()));
+        }
+        let mut terminated = vec![false; n];
+        steps.begins.iter().skip(1).for_each(|&row| terminated[row - 1] = true);
+        let played = Rollout {
+            steps: n,
+            terminated,
+            truncated: vec![false; n],
+            ..Rollout::new(1, spec.obs, 0, &spec.action_space)
+        };
+        // What is remembered is computed anew before each pass, so that there is no need for a burn-in.
+        Ok(Self::Sequences { all: sequences(&played, ticks, 0), ticks, played: Box::new(played) })
+    }
+
+    /// Draws the minibatches of a pass, of about so many rows.
+    fn minibatches(&mut self, batch: usize, rng: &mut ChaCha8Rng) -> Vec<Labelled> {
+        match self {
+            Self::Rows(order) => {
+                shuffle(order, rng);
+                order.chunks(batch).map(|rows| Labelled { rows: rows.to_vec(), sequences: Vec::new() }).collect()
+            }
+            Self::Sequences { all, ticks, .. } => {
+                shuffle(all, rng);
+                let parts = all.chunks((batch / *ticks).max(1));
+                parts.map(|part| Labelled { rows: rows_of(part, 1), sequences: part.to_vec() }).collect()
+            }
+        }
+    }
+
+    /// Returns how the rows of a minibatch are remembered, for a policy with memory.
+    fn recall(&self, minibatch: &Labelled, inputs: &InputBuilder<'_>, device: &Device) -> Option<Recall> {
+        match self {
+            Self::Rows(_) => None,
+            Self::Sequences { played, .. } => Some(recall(&minibatch.sequences, played, inputs, device)),
+        }
+    }
+}
+
+/// Returns what a policy remembers before each of these steps, row after row, if it plays their episodes from the start.
+///
+/// # Errors
+/// As [`Policy::forward`].
+fn remembered(policy: &Policy, steps: &LabelledSteps) -> Result<Vec<f32>, LearnError> {
+    let (width, numbers, n) = (policy.memory(), policy.obs_dim(), steps.len());
+    let mut before = vec![0.0; n * width];
+    let ends = steps.begins.iter().skip(1).copied().chain([n]);
+    let episodes: Vec<(usize, usize)> = steps.begins.iter().copied().zip(ends).collect();
+    // The last tick of an episode leaves nothing to remember.
+    let longest = episodes.iter().map(|(begin, end)| end - begin).max().unwrap_or(0);
+    for tick in 0..longest.saturating_sub(1) {
+        let rows: Vec<usize> =
+            episodes.iter().filter(|(begin, end)| begin + tick + 1 < *end).map(|(begin, _)| begin + tick).collect();
+        let mut obs = Observations::with_capacity(&policy.observation(), rows.len());
+        for &row in &rows {
+            obs.push(steps.obs.row(row, numbers))?;
+        }
+        let memory: Vec<f32> = rows.iter().flat_map(|row| &before[row * width..(row + 1) * width]).copied().collect();
+        let after = policy.forward_remembering(&[], &[], &memory, obs.as_slice(), rows.len())?.memory;
+        for (row, after) in rows.iter().zip(after.chunks_exact(width)) {
+            before[(row + 1) * width..(row + 2) * width].copy_from_slice(after);
+        }
+    }
+    Ok(before)
 }
 
 #[cfg(test)]
@@ -374,5 +493,89 @@ mod tests {
         let nothing = LabelledSteps::empty(&spec);
         let error = learner.imitate(&nothing, 0, &ImitationConfig::default()).expect_err("no steps").to_string();
         assert!(error.contains("there are no labelled steps to imitate"), "{error}");
+    }
+
+    /// Returns episodes whose first observation names the label of their last tick.
+    fn cued(episodes: usize) -> LabelledSteps {
+        let mut rng = Streams::new(5).stream("cues", 0);
+        let mut steps = LabelledSteps::empty(&spec(ActionSpace::Discrete(3)));
+        for _ in 0..episodes {
+            let right = normal(&mut rng) > 0.0;
+            steps.begins.push(steps.len());
+            for tick in 0..6 {
+                let cue = if right { 1.0 } else { -1.0 };
+                steps.obs.push(&[if tick == 0 { cue } else { 0.0 }, tick as f32 / 5.0]).expect("vectors");
+                let label = if tick == 5 { u32::from(right) } else { 2 };
+                steps.actions.push(&ActionValue::Discrete(label)).expect("a choice");
+            }
+        }
+        steps
+    }
+
+    /// Returns the share of the last ticks that a policy gets right.
+    fn right_at_the_end(learner: &PpoLearner, steps: &LabelledSteps) -> f64 {
+        let policy = learner.policy();
+        let memory = remembered(&policy, steps).expect("finite");
+        let output = policy.forward_remembering(&[], &[], &memory, steps.obs.as_slice(), steps.len()).expect("finite");
+        let ends: Vec<usize> = (5..steps.len()).step_by(6).collect();
+        let equal = ends.iter().filter(|&&row| Some(output.greedy(row)) == steps.actions.get(row)).count();
+        equal as f64 / ends.len() as f64
+    }
+
+    fn with_memory(memory: MemoryKind) -> PpoLearner {
+        let config = PpoConfig { hidden: vec![32], memory, ..PpoConfig::default() };
+        PpoLearner::new(config, spec(ActionSpace::Discrete(3)), 3, DeviceKind::Flex).expect("good settings")
+    }
+
+    #[test]
+    fn a_policy_with_memory_learns_what_depends_on_an_earlier_tick() {
+        let (steps, others) = (cued(200), cued(300));
+        let config = ImitationConfig { lr: 1e-2, epochs: 12, batch: 120, ..ImitationConfig::default() };
+        let right = |memory| {
+            let mut learner = with_memory(memory);
+            learner.imitate(&steps, 0, &config).expect("finite");
+            right_at_the_end(&learner, &others)
+        };
+        let [none, gru, stack] =
+            [MemoryKind::None, MemoryKind::Gru { hidden: 8, sequence: 3, burn_in: 0 }, MemoryKind::Stack { ticks: 6 }]
+                .map(right);
+        assert!((0.3..0.7).contains(&none), "without memory the cue is gone: {none}");
+        assert!(stack > 0.95, "{stack}");
+        // Its sequences are shorter than an episode: what leads from the first one into the second has no gradient.
+        assert!(gru > none - 0.3, "{gru}");
+        let whole = right(MemoryKind::Gru { hidden: 8, sequence: 6, burn_in: 0 });
+        assert!(whole > 0.95, "{whole}");
+    }
+
+    #[test]
+    fn what_is_remembered_is_what_a_policy_would_remember_in_play() {
+        let (steps, learner) = (cued(3), with_memory(MemoryKind::Gru { hidden: 4, sequence: 6, burn_in: 0 }));
+        let (policy, before) = (learner.policy(), remembered(&learner.policy(), &steps).expect("finite"));
+        for episode in 0..3 {
+            let mut memory = vec![0.0; 4];
+            for row in episode * 6..episode * 6 + 6 {
+                assert_eq!(before[row * 4..row * 4 + 4], memory, "row {row}");
+                let output = policy.forward_remembering(&[], &[], &memory, steps.obs.row(row, 2), 1);
+                memory = output.expect("finite").memory;
+            }
+        }
+    }
+
+    #[test]
+    fn steps_whose_episodes_are_not_known_are_refused_by_a_memory() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("labels.safetensors");
+        let spec = spec(ActionSpace::Discrete(3));
+        let mut steps = cued(2);
+        steps.save(&path, &spec).expect("written");
+        assert_eq!(LabelledSteps::load(&path, &spec).expect("readable"), steps);
+        steps.begins = vec![6, 0];
+        steps.save(&path, &spec).expect("written");
+        let error = LabelledSteps::load(&path, &spec).expect_err("in no order").to_string();
+        assert!(error.contains("ascending rows"), "{error}");
+        steps.begins.clear();
+        let mut learner = with_memory(MemoryKind::Stack { ticks: 2 });
+        let error = learner.imitate(&steps, 0, &ImitationConfig::default()).expect_err("unknown").to_string();
+        assert!(error.contains("do not say where") && error.contains("`ppo.memory`"), "{error}");
     }
 }

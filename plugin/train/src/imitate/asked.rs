@@ -13,6 +13,7 @@ use bevy_playbot::{
     legal::LegalActions,
     level::LevelQueue,
     observation::Observation,
+    policy::AgentMemory,
     streams::AgentStreams,
     systems::PlaybotSystems,
     vision::{ObservationConfig, ObservationKind, VisionError},
@@ -162,10 +163,9 @@ fn no_action(space: &ActionSpace) -> ActionValue {
     match space {
         ActionSpace::Discrete(_) => ActionValue::Discrete(u32::MAX),
         ActionSpace::Continuous(dim) => ActionValue::Continuous(vec![f32::NAN; *dim]),
-        ActionSpace::Mixed(MixedSpace { choices, numbers }) => ActionValue::Mixed {
-            choices: vec![u32::MAX; choices.sizes().len()],
-            numbers: vec![f32::NAN; *numbers],
-        },
+        ActionSpace::Mixed(MixedSpace { choices, numbers }) => {
+            ActionValue::Mixed { choices: vec![u32::MAX; choices.sizes().len()], numbers: vec![f32::NAN; *numbers] }
+        }
     }
 }
 
@@ -199,6 +199,7 @@ fn label_all(world: &mut World, asking: &mut Asking) -> Result<(), String> {
     let entities = world.resource::<AgentOrder>().entities().to_vec();
     let mut rows = Vec::new();
     let (mut seen, mut legal, mut is_masked) = (Observations::empty(&spec.obs), Vec::new(), false);
+    let (width, mut memories) = (policy.memory(), Vec::new());
     for (place, &entity) in entities.iter().enumerate() {
         let agent = world.entity(entity);
         let (Some(who), Some(episode), Some(Control::Bot)) =
@@ -227,7 +228,10 @@ fn label_all(world: &mut World, asking: &mut Asking) -> Result<(), String> {
             Some(mask) => legal.extend_from_slice(mask.mask()),
             None => legal.resize(legal.len() + spec.action_space.options(), true),
         }
-        rows.push((place, entity, action.0.clone()));
+        let memory = agent.get::<AgentMemory>().filter(|memory| memory.0.len() == width && episode.tick > 0);
+        memories.extend(memory.map_or(&[][..], |memory| &memory.0));
+        rows.push((place, entity, action.0.clone(), episode.tick == 0));
+        memories.resize(rows.len() * width, 0.0);
     }
     if rows.is_empty() {
         return Ok(());
@@ -235,10 +239,14 @@ fn label_all(world: &mut World, asking: &mut Asking) -> Result<(), String> {
     if !is_masked {
         legal.clear();
     }
-    let mut output = policy.forward(&[], seen.as_slice(), rows.len()).map_err(words)?;
+    let mut output = policy.forward_remembering(&[], &[], &memories, seen.as_slice(), rows.len()).map_err(words)?;
     output.restrict(&legal);
-    for (row, (place, entity, label)) in rows.into_iter().enumerate() {
-        let steps = single(&spec, &seen, row, &label, &legal).map_err(words)?;
+    for (row, (place, entity, label, begins)) in rows.into_iter().enumerate() {
+        if let Some(mut memory) = world.get_mut::<AgentMemory>(entity).filter(|_| width > 0) {
+            memory.0 = output.memory[row * width..(row + 1) * width].to_vec();
+        }
+        let mut steps = single(&spec, &seen, row, &label, &legal).map_err(words)?;
+        steps.begins.extend(begins.then_some(0));
         asking.steps[place].extend(&steps, &spec).map_err(words)?;
         let stream = &mut asking.streams[place];
         // Both are drawn in any case, so that shares of 0 and 1 use the streams alike.
