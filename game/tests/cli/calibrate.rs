@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-use bevy_playbot::action::{Actions};
+use bevy_playbot::action::Actions;
 use bevy_playbot::demo::file::{Decider, DemoEnd, DemoEpisode, DemoHeader, DemoReader, DemoWriter};
 use playbot_games::coinrun::CoinRun;
 use playbot_harness::game::Game;

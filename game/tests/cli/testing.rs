@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path, process::Output};
 
-use bevy_playbot::action::{Actions};
+use bevy_playbot::action::Actions;
 use bevy_playbot::demo::file::{Decider, DemoReader, DemoWriter};
 use serde_json::Value;
 

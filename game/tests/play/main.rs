@@ -6,7 +6,7 @@ mod program;
 
 use std::{collections::BTreeSet, path::Path};
 
-use bevy_playbot::action::{Actions};
+use bevy_playbot::action::Actions;
 use bevy_playbot::demo::file::{Decider, DemoEnd, DemoEpisode, DemoReader};
 use playbot_shell::Desk;
 use program::{code, command, errors, said};

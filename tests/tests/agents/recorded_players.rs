@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use bevy_playbot::{
-    action::{Actions},
+    action::Actions,
     bot::BlindBot,
     demo::file::{Decider, DemoEpisode, DemoReader, DemoWriter},
     prelude::*,

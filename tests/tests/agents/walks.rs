@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use bevy::prelude::*;
-use bevy_playbot::action::{Actions};
+use bevy_playbot::action::Actions;
 use bevy_playbot::demo::file::{Decider, DemoEnd, DemoEpisode, DemoHeader, DemoWriter};
 use playbot::prelude::*;
 use playbot_harness::{

@@ -176,7 +176,7 @@ fn decisions_that_cannot_hold_are_problems_that_say_what_to_type() {
         .observe(["x"], || [0.0])
         .every(4);
     let problem = continuous.problem().expect("it cannot be held");
-    assert!(problem.contains("continuous actions") && problem.contains("lower `.hz`"), "{problem}");
+    assert!(problem.contains("actions with numbers") && problem.contains("lower `.hz`"), "{problem}");
     assert_eq!(slow(1).problem(), None);
 }
 

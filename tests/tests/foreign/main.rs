@@ -3,6 +3,7 @@
 mod actions;
 mod agents;
 mod assets;
+mod choices;
 mod clocks;
 mod experiments;
 mod faults;

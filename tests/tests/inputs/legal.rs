@@ -10,7 +10,7 @@ use std::{
 
 use bevy::prelude::*;
 use bevy_playbot::{
-    action::{Actions},
+    action::Actions,
     demo::file::{DemoEpisode, DemoHeader, DemoReader, DemoWriter},
     vision::ObservationConfig,
 };

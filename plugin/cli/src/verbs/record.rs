@@ -353,7 +353,7 @@ fn play(
 #[cfg(test)]
 mod tests {
     use bevy::prelude::{App, KeyCode, Res};
-    use bevy_playbot::action::{Actions};
+    use bevy_playbot::action::Actions;
     use bevy_playbot::demo::file::DemoReader;
     use clap::Parser;
     use playbot_harness::{foreign::ForeignGame, level_files::LevelDesigns};

@@ -7,11 +7,7 @@ use crate::{
     },
     explore::CellGrid,
 };
-use bevy_playbot::{
-    action::ActionValue,
-    episode::EpisodeResult,
-    fault::Fault,
-};
+use bevy_playbot::{action::ActionValue, episode::EpisodeResult, fault::Fault};
 use playbot_harness::{
     detector::DetectorSetting,
     game::{Game, idle_action},

@@ -6,10 +6,7 @@ use bevy_playbot::{
     action::{Action, ActionSpace, ActionValue, Actions},
     agent::Control,
     bot::BlindBot,
-    demo::{
-        file::DemoEpisode,
-        replay::Replay,
-    },
+    demo::{file::DemoEpisode, replay::Replay},
     engine::{EpisodeSeeds, LevelFiles, misfit, panics::PanicReports, tick_world},
     episode::{Episode, EpisodeResult},
     fault::Fault,

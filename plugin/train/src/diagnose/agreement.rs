@@ -135,7 +135,8 @@ fn chance(actions: &[&ActionValue]) -> f64 {
         return counts.values().map(|number| (number / count).powi(2)).sum();
     }
     let columns = (0..first.numbers().len()).map(|at| {
-        let values = || actions.iter().filter_map(move |action| action.numbers().get(at).map(|value| f64::from(*value)));
+        let values =
+            || actions.iter().filter_map(move |action| action.numbers().get(at).map(|value| f64::from(*value)));
         let average = mean(values()).unwrap_or_default();
         2.0 * mean(values().map(|value| (value - average).powi(2))).unwrap_or_default()
     });
@@ -149,8 +150,11 @@ fn probed(evidence: &Evidence) -> Option<(f64, f64)> {
     let episodes: Vec<&PlayedEpisode> = replayed_episodes(set).collect();
     let all = || episodes.iter().flat_map(|episode| &episode.actions);
     // Combinations of several choices are numbered as they are found.
-    let combinations: BTreeMap<&[u32], usize> =
-        all().filter(|action| action.options().len() > 1).map(|action| action.options()).zip(std::iter::repeat(0)).collect();
+    let combinations: BTreeMap<&[u32], usize> = all()
+        .filter(|action| action.options().len() > 1)
+        .map(|action| action.options())
+        .zip(std::iter::repeat(0))
+        .collect();
     let combinations: BTreeMap<&[u32], usize> = combinations.into_keys().zip(0..).collect();
     let class = |action: &ActionValue| match action.options() {
         [] => None,

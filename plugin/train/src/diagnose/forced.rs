@@ -84,9 +84,8 @@ pub fn force(game: &dyn Game, mode: &str, episode: &PlayedEpisode) -> Result<Vec
 /// Returns the actions to try: name, number, and the ways to take each.
 fn candidates(game: &dyn Game) -> Vec<(String, u32, Vec<ActionValue>)> {
     let doing = single_actions(game).into_iter().filter(|single| !single.is_idle);
-    let named = |SingleAction { name, number, ways, .. }| {
-        (name.unwrap_or_else(|| format!("action {number}")), number, ways)
-    };
+    let named =
+        |SingleAction { name, number, ways, .. }| (name.unwrap_or_else(|| format!("action {number}")), number, ways);
     doing.map(named).collect()
 }
 

@@ -3,8 +3,7 @@
 use crate::diagnose::play::mean;
 use bevy_playbot::skill_prior::SkillPrior;
 use playbot_learner::{
-    ActionValue, LearnError, ObsKind, Policy, PolicyOutput, Prior, SkillDraw, SkillModel, Streams,
-    rng::normal,
+    ActionValue, LearnError, ObsKind, Policy, PolicyOutput, Prior, SkillDraw, SkillModel, Streams, rng::normal,
 };
 use std::{
     collections::BTreeMap,

@@ -3,7 +3,9 @@
 use std::{fs, path::Path};
 
 use bevy_playbot::action::{ActionSpace, Actions};
-use bevy_playbot::demo::file::{Decider, DemoEnd, DemoEpisode, DemoHeader, DemoReader, DemoSummary, DemoWriter, repair};
+use bevy_playbot::demo::file::{
+    Decider, DemoEnd, DemoEpisode, DemoHeader, DemoReader, DemoSummary, DemoWriter, repair,
+};
 use bevy_playbot::level::LevelFile;
 use playbot::prelude::*;
 use playbot_test::findings::{FindingHead, StoredFinding};

@@ -152,7 +152,9 @@ impl Moves {
         match action {
             ActionValue::Discrete(choice) => *choice == self.idle,
             ActionValue::Mixed { choices, .. } if !choices.is_empty() => choices.iter().all(|&option| option == 0),
-            ActionValue::Continuous(values) | ActionValue::Mixed { numbers: values, .. } => values.first().is_some_and(|value| *value > 0.5),
+            ActionValue::Continuous(values) | ActionValue::Mixed { numbers: values, .. } => {
+                values.first().is_some_and(|value| *value > 0.5)
+            }
         }
     }
 }
