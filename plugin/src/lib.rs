@@ -96,6 +96,7 @@ pub mod camera;
 mod carry_over;
 pub mod demo;
 pub mod engine;
+pub mod entities;
 pub mod episode;
 pub mod fault;
 pub mod headless;

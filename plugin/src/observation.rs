@@ -23,7 +23,7 @@
 
 use crate::{agent::Agent, carry_over::ReflectCarryComponent, episode::Episode, fault::Faults};
 use bevy::prelude::*;
-use playbot_learner::{ObsKind, Observations};
+use playbot_learner::{EntitySet, ObsKind, Observations};
 use serde::{Deserialize, Serialize};
 use std::{f64::consts::TAU, sync::Arc};
 
@@ -43,6 +43,12 @@ impl ObservationSpace {
     /// Returns whether there are no values.
     pub fn is_empty(&self) -> bool {
         self.names.is_empty()
+    }
+
+    /// Returns the sets of things among the values: those with names such as `enemy[0].present`
+    /// ([`EntitySensor`](crate::entities::EntitySensor)).
+    pub fn sets(&self) -> Vec<EntitySet> {
+        EntitySet::all_in(&self.names)
     }
 }
 

@@ -13,7 +13,7 @@
 //! ```
 
 use crate::{
-    action, agent, bot, episode,
+    action, agent, bot, entities, episode,
     fault::{FaultSystems, Faults, announce_faults},
     key_bindings::KeyboardPlugin,
     legal, observation, placement,
@@ -40,7 +40,7 @@ impl Plugin for PlaybotPlugin {
         app.init_resource::<agent::AgentOrder>()
             .init_resource::<Faults>()
             .init_resource::<episode::Tick>()
-            .add_plugins((action::plugin, episode::plugin, observation::plugin))
+            .add_plugins((action::plugin, episode::plugin, observation::plugin, entities::plugin))
             .add_plugins((streams::plugin, policy::plugin, skill_prior::plugin))
             .init_schedule(ObserveSchedule)
             .add_systems(Last, announce_faults.in_set(FaultSystems).after(PlaybotSystems::Reset));

@@ -16,6 +16,7 @@ pub use crate::{
         recorder::{Recorder, Recording},
         replay::Replay,
     },
+    entities::EntitySensor,
     episode::{Episode, EpisodeCount, EpisodeEnd, EpisodeEnded, StartEpisode},
     headless::{PlaybotAppExt, headless_app},
     key_bindings::{KeyAxis, KeyBindings},

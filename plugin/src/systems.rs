@@ -63,9 +63,10 @@ pub enum PlaybotSystems {
 #[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ObserveSchedule;
 
-/// Runs the sensors.
+/// Runs the sensors: the systems of the game, and then those of sets of things.
 pub fn run_observe_schedule(world: &mut World) {
     world.run_schedule(ObserveSchedule);
+    crate::entities::look(world);
 }
 
 // Fixed order for systems whose order the game leaves open.

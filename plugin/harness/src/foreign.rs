@@ -16,6 +16,7 @@
 //! - `agents`: several agents in one World, their inputs, and those that play along.
 //! - `clicks`: clicks on buttons of Bevy's UI.
 //! - `snapshot`: the state of an episode, saved and loaded.
+//! - `entities`: sets of things that agents see.
 //! - `observe`, `paths`, `guess`: observation, position, reward and end after a tick, observations by the paths of
 //!   their values, and the position that is not declared.
 //!
@@ -61,6 +62,7 @@ mod agents;
 mod clicks;
 mod clocks;
 mod description;
+mod entities;
 mod guess;
 mod input;
 #[cfg(feature = "ldtk")]
@@ -79,6 +81,7 @@ use crate::{
     foreign::{
         agents::{SharingAgents, add_agents_along},
         description::{Description, ForeignPlugin, nothing_seen},
+        entities::problem_of,
         input::{ForeignBot, Input},
         levels::LevelParts,
         runtime::{AgentPlace, SystemFactory},
@@ -105,6 +108,7 @@ pub use crate::foreign::clicks::ButtonClicks;
 #[cfg(any(feature = "ldtk", feature = "tiled"))]
 pub use crate::foreign::levels::MapLegend;
 pub use crate::foreign::{
+    entities::IntoThings,
     guess::{PLAYER_NAMES, PlayerGuess},
     levels::{EditorLevel, IntoLevelTextError, LevelFromFile, PlayedMode},
     observe::IntoPlanPosition,
@@ -145,6 +149,7 @@ impl ForeignGame {
             names: Vec::new(),
             observe: None,
             paths: Vec::new(),
+            entities: Vec::new(),
             has_camera: false,
             position: None,
             cell: None,
@@ -651,7 +656,7 @@ impl HostTools for ForeignGame {
     }
 
     fn unplayable(&self) -> Option<String> {
-        let Description { name, input, agents, observe, paths, has_camera, names, .. } = &*self.description;
+        let Description { name, input, agents, observe, paths, has_camera, names, entities, .. } = &*self.description;
         if let Some(problem) = agents.problem(input) {
             return Some(format!("the game `{name}` {problem}"));
         }
@@ -660,7 +665,7 @@ impl HostTools for ForeignGame {
                 "the game `{name}` has no actions: say what an agent can do, for instance with `.keys`"
             ));
         }
-        if observe.is_none() && paths.is_empty() {
+        if observe.is_none() && paths.is_empty() && entities.is_empty() {
             let unseen = nothing_seen(name, *has_camera, cfg!(feature = "camera"));
             if unseen.is_some() {
                 return unseen;
@@ -668,6 +673,9 @@ impl HostTools for ForeignGame {
         }
         if observe.is_some() && names.is_empty() {
             return Some(format!("`.observe` of the game `{name}` names no values"));
+        }
+        if let Some(problem) = problem_of(entities) {
+            return Some(format!("the game `{name}`: {problem}"));
         }
         if self.description.modes.is_empty() {
             return Some(format!("`.modes` of the game `{name}` names no mode: name one, or leave it out"));

@@ -9,6 +9,7 @@
 //! - [`host_ops`]: tanh, log-softmax and recurrent layers, for both backends.
 //! - [`dense`]: the dense layers of a network as one operation, for flex.
 //! - [`trunk`]: the convolutions of an image encoder as one operation, for flex.
+//! - [`pool`]: mean and maximum over groups of rows, for both backends.
 //! - [`elementwise`]: activations over slices, written for vector instructions.
 //! - [`instructions`]: the vector instructions of the loops, on which no number depends.
 //! - [`host_numbers`]: conversion between tensors and numbers in host memory.
@@ -25,6 +26,7 @@ pub mod host_numbers;
 pub mod host_ops;
 pub mod instructions;
 pub mod kept_memory;
+pub mod pool;
 mod tile;
 pub mod trunk;
 

@@ -5,10 +5,11 @@
 //! so outputs stay the same to the bit: products with 0 change no sum.
 
 use crate::{
-    LearnError, ObsKind,
+    EntityBlock, EntitySet, LearnError, ObsKind,
     device::send,
     nn::{Adam, ParamVisitor, Parameters, host},
     norm::{ObsNormalizer, ObsStats, RunningStats},
+    policy::{ENTITIES, EntityShape},
 };
 use burn::tensor::{Tensor, TensorData};
 use std::{
@@ -43,6 +44,8 @@ impl<'a> StartFrom<'a> {
 pub struct InputMap {
     old: usize,
     sources: Vec<Option<usize>>,
+    /// Sets of the new observation; `None` if they are where they were.
+    sets: Option<Vec<EntityBlock>>,
 }
 
 impl InputMap {
@@ -57,7 +60,7 @@ impl InputMap {
                  fewer"
             )));
         }
-        Ok(Self { old, sources: (0..new).map(|value| (value < old).then_some(value)).collect() })
+        Ok(Self { old, sources: (0..new).map(|value| (value < old).then_some(value)).collect(), sets: None })
     }
 
     /// Creates the map of an observation whose values are called `new`, from one whose values were called `old`. Values
@@ -86,7 +89,8 @@ impl InputMap {
         }
         let sources: Vec<_> = new.iter().map(|name| places.remove(name.as_str())).collect();
         if places.is_empty() {
-            return Ok(Self { old: old.len(), sources });
+            let sets = EntitySet::all_in(new).into_iter().map(|set| set.block).collect();
+            return Ok(Self { old: old.len(), sources, sets: Some(sets) });
         }
         let gone: Vec<_> = places.keys().map(|name| format!("`{name}`")).collect();
         Err(LearnError::Config(format!(
@@ -108,6 +112,40 @@ impl InputMap {
     /// Returns whether the old values are in their old order, so that outputs stay the same to the bit.
     pub fn keeps_order(&self) -> bool {
         self.sources.iter().flatten().is_sorted()
+    }
+
+    /// Returns the sets of the new observation, if `old` are those of the shorter one.
+    pub(crate) fn sets(&self, old: &[EntityBlock]) -> Vec<EntityBlock> {
+        match &self.sets {
+            Some(sets) if !old.is_empty() => sets.clone(),
+            _ => old.to_vec(),
+        }
+    }
+
+    /// Returns the map of the numbers behind the encoders of sets, of which `own` belongs to the new observation, and
+    /// whether the things of each set are no more than they were.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if one of the networks has no encoder, or the sets are others.
+    pub(crate) fn behind(
+        &self,
+        own: Option<&EntityShape>,
+        theirs: Option<&EntityShape>,
+    ) -> Result<(Self, bool), LearnError> {
+        let (own, theirs) = match (own, theirs) {
+            (None, None) => return Ok((self.clone(), true)),
+            (Some(own), Some(theirs)) => (own, theirs),
+            (own, _) => {
+                let (new, old) =
+                    if own.is_some() { ("as sets", "value by value") } else { ("value by value", "as sets") };
+                return Err(LearnError::Config(format!(
+                    "it reads sets of things {old}, and the new run {new}: give both the same `ppo.entities` and                      `skills.entities`"
+                )));
+            }
+        };
+        let sources = own.sources(theirs, |value| self.sources.get(value).copied().flatten())?;
+        let is_as_large = own.blocks.iter().zip(&theirs.blocks).all(|(own, theirs)| own.slots == theirs.slots);
+        Ok((Self { old: theirs.features(), sources, sets: None }, is_as_large))
     }
 
     /// Returns whether nothing is new and nothing has moved.
@@ -155,9 +193,9 @@ impl InputMap {
         }
     }
 
-    /// Returns frozen statistics of the new observation. New values stay as they are.
-    pub(crate) fn frozen_stats(&self, old: &ObsStats) -> ObsStats {
-        ObsStats { mean: self.of(&old.mean, &0.0), inv_std: self.of(&old.inv_std, &1.0) }
+    /// Returns frozen statistics of the new observation, whose networks read these sets. New values stay as they are.
+    pub(crate) fn frozen_stats(&self, old: &ObsStats, sets: &[EntityBlock]) -> ObsStats {
+        ObsStats { mean: self.of(&old.mean, &0.0), inv_std: self.of(&old.inv_std, &1.0) }.shared(sets)
     }
 
     /// Returns running statistics of the new observation. Those of new values begin anew.
@@ -165,14 +203,14 @@ impl InputMap {
         if self.is_same() {
             return old;
         }
-        let fresh = RunningStats::new(1);
+        let (fresh, sets) = (RunningStats::new(1), self.sets(old.sets()));
         let counts = match old.counts.is_empty() {
             true => vec![old.stats.count; old.stats.dim()],
             false => old.counts,
         };
         let RunningStats { mean, var, count } = old.stats;
         let stats = RunningStats { mean: self.of(&mean, &fresh.mean[0]), var: self.of(&var, &fresh.var[0]), count };
-        ObsNormalizer { stats, counts: self.of(&counts, &fresh.count) }
+        ObsNormalizer::of_parts(stats, self.of(&counts, &fresh.count), sets)
     }
 }
 
@@ -283,7 +321,7 @@ fn layer_of<'a>(name: &'a str, prefix: &str) -> &'a str {
 
 /// Returns whether a layer reads the features behind the hidden layers.
 fn is_output(layer: &str) -> bool {
-    let is_hidden = |last: &str| last == "cnn" || last.strip_prefix('l').is_some_and(is_number);
+    let is_hidden = |last: &str| last == "cnn" || last == ENTITIES || last.strip_prefix('l').is_some_and(is_number);
     !is_memory(layer) && !layer.rsplit('.').next().is_some_and(is_hidden)
 }
 
@@ -315,10 +353,10 @@ pub(crate) fn transplant<M: Parameters + Clone>(
         hidden.map(str::to_owned).collect::<BTreeSet<_>>()
     };
     let (own_hidden, their_hidden) = (hidden(&own), hidden(&theirs));
-    // The first layer behind a trunk reads its features, of which none is new.
+    // The first layer behind a trunk reads its features, of which none is new; behind an encoder of sets also other values.
     let input = layers
         .iter()
-        .find(|layer| !layer.ends_with(".cnn") && !is_memory(layer))
+        .find(|layer| !layer.ends_with(".cnn") && !layer.ends_with(ENTITIES) && !is_memory(layer))
         .copied()
         .unwrap_or_default()
         .to_owned();

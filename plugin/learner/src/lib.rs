@@ -41,6 +41,7 @@
 mod begin_from;
 mod device;
 pub mod disk;
+mod entities;
 mod error;
 mod file;
 mod learner;
@@ -67,13 +68,14 @@ pub use crate::{
     begin_from::{InputMap, StartFrom, TakenOver},
     device::{DeviceKind, Traffic, UnknownDevice},
     disk::{write_atomically, write_atomically_with},
+    entities::{EntityBlock, EntitySet, PRESENT},
     error::{FileError, HasExitCode, LearnError, SettingError, brief_number, io_exit_code},
     file::{BrokenSeal, Unsealed, seal_json, seal_text, unseal_json, unseal_text},
     learner::{ContinuedSchedule, LearnTimes, Learner, LearnerBase, LearnerMetrics},
     mixed_space::{Choices, MOST_CHOICES, MixedSpace},
     norm::RewardReset,
     observation::{Augmentation, ImageShape, ObsKind, ObsSlice, Observations, PictureMetadata},
-    policy::{MemoryKind, Policy, PolicyOutput, StdKind},
+    policy::{EntityKind, MemoryKind, Policy, PolicyOutput, StdKind},
     policy_file::{PolicyFile, PolicyMetadata},
     ppo::{Curiosity, ImitationConfig, LabelledSteps, PpoConfig, PpoLearner, UpdateMetrics},
     rng::{RngState, Streams},

@@ -1,6 +1,6 @@
 //! Normalisation of observations and rewards: running, and for observations also frozen.
 
-use crate::{FileError, LearnError, file::TensorFile};
+use crate::{EntityBlock, FileError, LearnError, file::TensorFile};
 use playbot_kernels::kept_memory::{OF_A_MOVE, share};
 use serde::{Deserialize, Serialize};
 
@@ -43,6 +43,31 @@ impl ObsStats {
         Self { mean, inv_std }
     }
 
+    /// Computes them as [`Self::of`], with one mean and deviation for each number of a set's things, over those that are
+    /// there. Presences stay as they are.
+    pub(crate) fn tied<'a>(rows: impl Iterator<Item = &'a [f32]> + Clone, dim: usize, blocks: &[EntityBlock]) -> Self {
+        let mut stats = Self::of(rows.clone(), dim);
+        for block in blocks {
+            let things = OfThings::of(rows.clone(), block);
+            for (number, (mean, squares)) in things.numbers.into_iter().enumerate() {
+                let scale = inverse_deviation(squares / things.count.max(1.0));
+                block.each_slot(number, |place| (stats.mean[place], stats.inv_std[place]) = (mean, scale));
+            }
+            block.each_presence(|place| (stats.mean[place], stats.inv_std[place]) = (0.0, 1.0));
+        }
+        stats
+    }
+
+    /// Gives all things of a set the statistics of its first slot.
+    #[must_use]
+    pub(crate) fn shared(mut self, blocks: &[EntityBlock]) -> Self {
+        for block in blocks {
+            block.share(&mut self.mean);
+            block.share(&mut self.inv_std);
+        }
+        self
+    }
+
     /// Returns all of `rows` normalised.
     pub(crate) fn normalize(&self, rows: &[f32]) -> Vec<f32> {
         let (mut out, width) = (vec![0.0; rows.len()], self.mean.len().max(1));
@@ -73,25 +98,118 @@ pub struct ObsNormalizer {
     pub stats: RunningStats,
     /// Rows of each value, plus 1e-4, if some values came later than others; empty otherwise.
     pub(crate) counts: Vec<f64>,
+    /// Sets whose things share their statistics. Only things that are there count, and presences are not normalised.
+    blocks: Vec<EntityBlock>,
 }
 
 impl ObsNormalizer {
     /// Creates a normaliser without data.
     pub fn new(dim: usize) -> Self {
-        Self { stats: RunningStats::new(dim), counts: Vec::new() }
+        Self { stats: RunningStats::new(dim), counts: Vec::new(), blocks: Vec::new() }
+    }
+
+    /// Ties the statistics of the things of these sets to each other, in a normaliser without data.
+    #[must_use]
+    pub(crate) fn tied(self, blocks: &[EntityBlock]) -> Self {
+        let counts = if blocks.is_empty() { self.counts } else { vec![self.stats.count; self.stats.dim()] };
+        Self { counts, blocks: blocks.to_vec(), ..self }
+    }
+
+    /// Creates a normaliser of statistics with the rows of each value. The things of a set get those of its first slot.
+    pub(crate) fn of_parts(stats: RunningStats, counts: Vec<f64>, blocks: Vec<EntityBlock>) -> Self {
+        let mut normalizer = Self { stats, counts, blocks };
+        for block in &normalizer.blocks {
+            block.share(&mut normalizer.stats.mean);
+            block.share(&mut normalizer.stats.var);
+            block.share(&mut normalizer.counts);
+        }
+        normalizer
+    }
+
+    /// Returns the sets whose things share their statistics.
+    pub(crate) fn sets(&self) -> &[EntityBlock] {
+        &self.blocks
     }
 
     /// Adds rows of observations.
     pub fn update(&mut self, rows: &[f32]) {
+        if self.blocks.is_empty() {
+            return self.stats.update_rows(rows, &mut self.counts);
+        }
+        let (before, counts) = (self.stats.clone(), self.counts.clone());
         self.stats.update_rows(rows, &mut self.counts);
+        let width = self.stats.dim().max(1);
+        for block in &self.blocks {
+            let things = OfThings::of(rows.chunks_exact(width), block);
+            for (number, batch) in things.numbers.into_iter().enumerate() {
+                block.each_slot(number, |place| {
+                    (self.stats.mean[place], self.stats.var[place]) = (before.mean[place], before.var[place]);
+                    self.counts[place] = counts[place] + things.count;
+                    if things.count > 0.0 {
+                        self.stats.add_dim(place, batch, (counts[place], things.count));
+                    }
+                });
+            }
+            block.each_presence(|place| {
+                (self.stats.mean[place], self.stats.var[place], self.counts[place]) = (0.0, 1.0, counts[place]);
+            });
+        }
     }
 
-    /// Returns the present mean and scale 1/√(var + 1e-8).
+    /// Returns the present mean and scale 1/√(var + 1e-8). Presences in sets stay as they are.
     pub fn snapshot(&self) -> ObsStats {
-        ObsStats {
-            mean: self.stats.mean.clone(),
-            inv_std: self.stats.var.iter().map(|v| 1.0 / (v + EPS).sqrt()).collect(),
+        let mut inv_std: Vec<f64> = self.stats.var.iter().map(|v| 1.0 / (v + EPS).sqrt()).collect();
+        self.blocks.iter().for_each(|block| block.each_presence(|place| inv_std[place] = 1.0));
+        ObsStats { mean: self.stats.mean.clone(), inv_std }
+    }
+}
+
+/// Mean and sum of squared deviations of each number of a set's things.
+struct OfThings {
+    count: f64,
+    numbers: Vec<(f64, f64)>,
+}
+
+impl OfThings {
+    /// Reads the things of all rows, each row's in their own order.
+    fn of<'a>(rows: impl Iterator<Item = &'a [f32]> + Clone, block: &EntityBlock) -> Self {
+        let (mut things, mut count, mut numbers) = (Vec::new(), 0.0, vec![(0.0, 0.0); block.width]);
+        for row in rows.clone() {
+            block.things(row, &mut things);
+            for thing in &things {
+                numbers.iter_mut().zip(*thing).for_each(|((sum, _), &x)| *sum += f64::from(x));
+                count += 1.0;
+            }
         }
+        numbers.iter_mut().for_each(|(mean, _)| *mean /= f64::max(count, 1.0));
+        for row in rows {
+            block.things(row, &mut things);
+            for thing in &things {
+                numbers
+                    .iter_mut()
+                    .zip(*thing)
+                    .for_each(|((mean, squares), &x)| *squares += (f64::from(x) - *mean).powi(2));
+            }
+        }
+        Self { count, numbers }
+    }
+}
+
+impl EntityBlock {
+    /// Calls `visit` with the place of one number of each slot.
+    fn each_slot(&self, number: usize, visit: impl FnMut(usize)) {
+        (0..self.slots).map(|slot| self.start + slot * (self.width + 1) + 1 + number).for_each(visit);
+    }
+
+    /// Copies the numbers of the first slot to the others.
+    fn share(&self, numbers: &mut [f64]) {
+        let slots = &mut numbers[self.range()];
+        (1..self.slots).for_each(|slot| slots.copy_within(..self.width + 1, slot * (self.width + 1)));
+    }
+
+    /// Calls `visit` with the place of each presence.
+    fn each_presence(&self, visit: impl FnMut(usize)) {
+        (0..self.slots).map(|slot| self.start + slot * (self.width + 1)).for_each(visit);
     }
 }
 

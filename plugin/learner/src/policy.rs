@@ -3,15 +3,17 @@
 //! The folder, in reading order:
 //!
 //! - `inputs`: inputs of networks: skills joined with observations.
+//! - `entities`: the encoder of sets of things.
 //! - `memory`: what policies remember from tick to tick.
 //! - `actor`: the network of a distribution over actions, and the one that estimates the return.
 
 mod actor;
+mod entities;
 mod inputs;
 mod memory;
 
 use crate::{
-    ActionSpace, ActionValue, Choices, LearnError, MixedSpace, ObsKind, ObsSlice, PolicySpec,
+    ActionSpace, ActionValue, Choices, EntityBlock, LearnError, MixedSpace, ObsKind, ObsSlice, PolicySpec,
     device::guarded,
     legal::restrict,
     nn::{
@@ -27,11 +29,13 @@ use std::sync::Arc;
 
 pub use crate::policy::{
     actor::{Actor, Critic, LogStd, NetShape, StdKind},
+    entities::{EntityEncoder, EntityKind, SetNet},
     inputs::NetInput,
     memory::{Memory, MemoryKind, Recall},
 };
 pub(crate) use crate::policy::{
     actor::{ActorShape, InputWidths, StdShape},
+    entities::{ENTITIES, EntityShape},
     inputs::{InputBuilder, StateBatch, joined_rows},
     memory::{BurnIn, Grid, send_rows},
 };
@@ -107,6 +111,12 @@ impl Policy {
     /// Returns the convolutions that read its images; `None` for vectors.
     pub fn cnn(&self) -> Option<CnnKind> {
         self.actor.cnn.as_ref().map(ImageNet::kind)
+    }
+
+    /// Returns the sets of things that its networks read as sets; empty if there are none, or they are read as other
+    /// values.
+    pub fn entities(&self) -> Vec<EntityBlock> {
+        self.actor.entities.as_ref().map_or_else(Vec::new, |encoder| encoder.shape().blocks)
     }
 
     /// Returns the numbers that it remembers from tick to tick; 0 without memory.

@@ -4,7 +4,6 @@ use crate::{
     ActionSpace, DeviceKind, FileError, ImageShape, LearnError, ObsKind, ObsSlice, Observations, PictureMetadata,
     PolicySpec, SeenLevels,
     file::{FileKind, TensorFile},
-    nn::CnnKind,
     norm::{ObsStats, put_obs_stats, take_obs_stats},
     policy::{ActorShape, InputWidths, NetShape, Policy, StateBatch},
     skill::{Prior, SKILL_STATS, SkillDraw, SkillSource},
@@ -206,7 +205,7 @@ impl PolicyShape {
     fn spec(&self) -> PolicySpec {
         let net = &self.actor.net;
         PolicySpec {
-            obs: self.image.map_or(ObsKind::Vector(self.actor.seen()), ObsKind::Image),
+            obs: self.image.map_or(ObsKind::Vector(self.actor.observed()), ObsKind::Image),
             latent: net.latent,
             action_space: self.action_space,
         }
@@ -262,7 +261,11 @@ impl SkillsShape {
         check_normaliser(self.normalised, policy, file)?;
         let (latent, plain) = (self.latent, device.plain());
         // Networks of images each have features of their own.
-        let obs_dim = |shape: &ActorShape| shape.cnn.as_ref().map_or(policy.obs.numbers(), CnnKind::features);
+        let obs_dim = |shape: &ActorShape| match (&shape.cnn, &shape.entities) {
+            (Some(cnn), _) => cnn.features(),
+            (None, Some(entities)) => entities.features(),
+            (None, None) => policy.obs.numbers(),
+        };
         let decoder_spec = PolicySpec { latent, ..*policy };
         let decoder = self.decoder.stored(&decoder_spec, file, "decoder", &plain)?;
         let widths = InputWidths { obs_dim: obs_dim(&self.decoder), latent };

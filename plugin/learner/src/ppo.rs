@@ -134,7 +134,11 @@ impl PpoLearner {
         }
         config.check_observation(&spec.obs)?;
         let rewards = config.norm_reward.then(|| config.reward_normalizer());
-        LearnerBase::new(spec, teacher, rewards, config.norm_obs, seed, device)
+        let mut base = LearnerBase::new(spec, teacher, rewards, config.norm_obs, seed, device)?;
+        base.observations = base.observations.map(|normalizer| normalizer.tied(config.entities.blocks()));
+        let copied = base.copied_teacher().map(|teacher| teacher.description.config.entities.blocks());
+        config.refuse_stack_of_sets(copied.unwrap_or(config.entities.blocks()))?;
+        Ok(base)
     }
 
     fn with_nets(config: PpoConfig, base: LearnerBase, nets: &PpoNets, curiosity: Option<Rnd>) -> Self {
@@ -471,7 +475,8 @@ impl PpoNets {
 fn actor_shape(config: &PpoConfig, base: &LearnerBase) -> ActorShape {
     let shape = match base.copied_teacher() {
         Some(teacher) => teacher.shape(),
-        None => ActorShape::new(&base.spec, &config.cnn, &config.hidden, config.activation, StdShape::Vector),
+        None => ActorShape::new(&base.spec, &config.cnn, &config.hidden, config.activation, StdShape::Vector)
+            .with_entities(&config.entities),
     };
     shape.with_memory(config.memory.shape())
 }

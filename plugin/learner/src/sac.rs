@@ -165,6 +165,11 @@ impl SacLearner {
                         init_from_decoder to false (the penalty still ties the two together)";
             return Err(LearnError::Config(text.to_owned()));
         }
+        if base.teacher.as_ref().is_some_and(|teacher| !teacher.description.config.entities.blocks().is_empty()) {
+            let text = "sac reads sets of things value by value, and cannot be tied to a skill model that reads them as \
+                        sets: learn the skills with `skills.entities=Flat`";
+            return Err(LearnError::Config(text.to_owned()));
+        }
         spec.obs.vector("SAC")?;
         Ok(base)
     }

@@ -33,7 +33,7 @@ use crate::{
     file::{FileKind, TensorFile},
     nn::frozen,
     norm::{ObsStats, put_obs_stats, take_obs_stats},
-    policy::{Actor, ActorShape, Policy, StdKind},
+    policy::{Actor, ActorShape, EntityEncoder, Policy, StdKind},
 };
 use playbot_kernels::elementwise::Activation;
 use serde::{Deserialize, Serialize};
@@ -96,14 +96,18 @@ impl SkillModel {
             (observation, _) => observation,
         };
         let map = InputMap::between(inputs, description.observation, observation)?;
-        let description = SkillDescription { observation, ..description.clone() };
+        let mut description = SkillDescription { observation, ..description.clone() };
+        let sets = map.sets(description.config.entities.blocks());
+        description.config.entities = description.config.entities.with_blocks(sets.clone());
         let SkillDescription { config, action_space, .. } = &description;
         let mut nets = SkillNets::new(config, observation, *action_space, &Streams::new(0), &device.plain())?;
-        let fit = |latent| Fit { inputs: &map, latent, memory: 0, is_refused: None };
+        let shape = |actor: &Actor| actor.entities.as_ref().map(EntityEncoder::shape);
+        let (behind, _) = map.behind(shape(&nets.decoder).as_ref(), shape(&actors.decoder).as_ref())?;
+        let fit = |latent| Fit { inputs: &behind, latent, memory: 0, is_refused: None };
         transplant(&mut nets.decoder, &actors.decoder, "decoder", fit(config.latent))?;
         transplant(&mut nets.prior, &actors.prior, "prior", fit(0))?;
         let stats = stats.map(|stats| match observation {
-            ObsKind::Vector(_) => Arc::new(map.frozen_stats(stats)),
+            ObsKind::Vector(_) => Arc::new(map.frozen_stats(stats, &sets)),
             ObsKind::Image(_) => Arc::new(stats.clone()),
         });
         Ok(Self { has_encoder: false, ..Self::new(description, &nets, stats, device) })
@@ -271,7 +275,8 @@ impl SkillDescription {
     }
 
     fn actor(&self, spec: &PolicySpec, std: StdKind) -> ActorShape {
-        ActorShape::new(spec, &self.config.cnn, &self.config.hidden, Activation::Relu, std.into())
+        let shape = ActorShape::new(spec, &self.config.cnn, &self.config.hidden, Activation::Relu, std.into());
+        shape.with_entities(&self.config.entities)
     }
 
     /// Takes the frozen normaliser called `name` out of a file, if the networks use one.

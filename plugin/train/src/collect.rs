@@ -5,7 +5,7 @@ use bevy_playbot::{
     action::{Action, ActionSpace, ActionValue},
     agent::{Agent, AgentOrder, Control},
     demo::recorder,
-    engine::{PolicyBatch, Renewal, SharedBatch, TickSchedules, draw_skills, tick_world},
+    engine::{PolicyBatch, Renewal, SharedBatch, TickSchedules, draw_skills, run_observe_schedule, tick_world},
     episode::{Episode, EpisodeEnd, EpisodeEnded},
     fault::{Fault, Faults},
     legal::LegalActions,
@@ -16,7 +16,7 @@ use bevy_playbot::{
     skill_prior::{ActiveSkill, SkillPrior},
     state_hash::StateHash,
     streams::AgentStreams,
-    systems::{ObserveSchedule, PlaybotSystems},
+    systems::PlaybotSystems,
     vision::{ObservationConfig, VisionError},
 };
 use playbot_harness::{
@@ -247,7 +247,7 @@ impl Collector {
 /// Agents between two episodes have no such state. Their row is 0 and is never used, since their last row ended an
 /// episode.
 fn bootstrap_values(world: &mut World, policy: &Policy, rollout: &mut Rollout) -> Result<(), LearnError> {
-    world.run_schedule(ObserveSchedule);
+    run_observe_schedule(world);
     if world.contains_resource::<SkillPrior>()
         && let Err(error) = world.run_system_cached(draw_skills)
     {
@@ -437,7 +437,7 @@ pub(crate) fn cut_episodes(
         return Ok(cut);
     }
     let before: Vec<_> = entities.iter().map(|&entity| world.get::<Observation>(entity).cloned()).collect();
-    world.run_schedule(ObserveSchedule);
+    run_observe_schedule(world);
     for (i, &row) in cut.agents.iter().enumerate() {
         let skill_from = cut.z.len();
         push_state(world, entities[row], &mut cut.z, &mut cut.left, &mut cut.obs);

@@ -15,7 +15,7 @@ use bevy::{
     window::PrimaryWindow,
     winit::WINIT_WINDOWS,
 };
-use bevy_playbot::{engine::TappedKeys, episode::Tick, vision::VisionSystems};
+use bevy_playbot::{engine::{TappedKeys, run_observe_schedule}, episode::Tick, vision::VisionSystems};
 use playbot_harness::prelude::*;
 use playbot_report::counted;
 use std::time::Duration;
@@ -173,7 +173,7 @@ fn show_tick(world: &mut World, mut shown: Local<Tick>) {
     if tick != *shown {
         *shown = tick;
         world.resource_mut::<OnlySync>().0 = true;
-        world.run_schedule(ObserveSchedule);
+        run_observe_schedule(world);
         world.resource_mut::<OnlySync>().0 = false;
     }
 }

@@ -10,6 +10,7 @@ use crate::{
         ForeignGame, Restart, agents,
         agents::SharingAgents,
         clocks::ClockSettings,
+        entities::SeenSet,
         input,
         input::Input,
         levels::{LevelFromFile, LevelParts, PlayedMode},
@@ -64,6 +65,8 @@ pub(super) struct Description {
     pub(super) names: Vec<String>,
     pub(super) observe: Option<SystemFactory<Vec<f32>>>,
     pub(super) paths: Vec<String>,
+    /// Sets of things behind these values.
+    pub(super) entities: Vec<SeenSet>,
     pub(super) has_camera: bool,
     /// Position of the agent on the plan of its level.
     pub(super) position: Option<SystemFactory<PositionAndHeight>>,
@@ -172,7 +175,8 @@ impl Description {
 
     pub(super) fn observation(&self) -> ObservationSpace {
         let names = if self.observe.is_some() { &self.names } else { &self.paths };
-        ObservationSpace { names: names.clone() }
+        let of_sets = self.entities.iter().flat_map(|(slots, _)| slots.names());
+        ObservationSpace { names: names.iter().cloned().chain(of_sets).collect() }
     }
 }
 

@@ -5,6 +5,7 @@ use crate::{
     detector::LevelProof,
     foreign::{
         ForeignGame,
+        entities::write_all,
         runtime::{
             Baseline, ForeignCell, OwnedSystem, ReaderFactory, Sensor, SystemFactory, note, playing_agents,
             with_foreign,
@@ -47,7 +48,8 @@ pub(super) fn observe(world: &mut World) {
 fn observe_for(world: &mut World, agent: Entity) {
     let Some(expected) = world.get::<VectorSensor>(agent).map(|sensor| sensor.space().len()) else { return };
     let values = with_foreign(world, agent, |world, foreign| {
-        let values = match &mut foreign.asked().sensor {
+        let parts = foreign.asked();
+        let mut values = match &mut parts.sensor {
             Sensor::System(system) => system.demand(world)?,
             Sensor::Paths(paths) => paths
                 .iter_mut()
@@ -56,14 +58,16 @@ fn observe_for(world: &mut World, agent: Entity) {
                 .map_err(|error| error.to_string())?,
             Sensor::Nothing => Vec::new(),
         };
-        if values.len() == expected {
+        let own = expected.saturating_sub(parts.entities.iter().map(|(slots, _)| slots.len()).sum());
+        if values.len() == own {
+            write_all(&mut parts.entities, world, &mut values)?;
             return Ok(values);
         }
         let system = foreign.game.description.sensor_name();
         Err(format!(
             "`.observe` names {}, but its system `{system}` returned {} in this tick: it must return every value in each \
              tick",
-            counted(expected as u64, "value"),
+            counted(own as u64, "value"),
             values.len()
         ))
     });

@@ -24,6 +24,7 @@ use bevy_playbot::{
     action::ActionValue,
     agent::{Agent, AgentOrder, Control},
     engine::system_errors,
+    entities::{EntitySlots, SeenThing},
     episode::{Episode, EpisodeEnd},
     fault::Faults,
 };
@@ -66,6 +67,7 @@ pub(super) struct RewardPart {
 /// The systems that are asked about one agent. Each agent has copies of its own, so each of them reads every message.
 pub(super) struct AgentParts {
     pub(super) sensor: Sensor,
+    pub(super) entities: Vec<(EntitySlots, OwnedSystem<Vec<SeenThing>>)>,
     pub(super) position: Option<OwnedSystem<PositionAndHeight>>,
     pub(super) cell: Option<OwnedSystem<Vec<i32>>>,
     pub(super) rewards: Vec<RewardPart>,
@@ -90,6 +92,7 @@ impl AgentParts {
         };
         Self {
             sensor: description.sensor(),
+            entities: description.entities.iter().map(|(slots, system)| (slots.clone(), system.make())).collect(),
             position: description.position.as_ref().map(|system| system.make()),
             cell: description.cell.as_ref().map(|system| system.make()),
             rewards: description.rewards.iter().map(part).collect(),

@@ -50,7 +50,7 @@ impl Linear {
     }
 
     /// Applies layers, one after the other, with the activation of each.
-    pub(super) fn chain(x: Tensor<2>, layers: &[(&Self, Option<Activation>)]) -> Tensor<2> {
+    pub(crate) fn chain(x: Tensor<2>, layers: &[(&Self, Option<Activation>)]) -> Tensor<2> {
         let of_layers = layers.iter().map(|(layer, activation)| layer.dense(*activation));
         dense(&x, &of_layers.collect::<Vec<_>>()).unwrap_or_else(|| {
             layers.iter().fold(x, |x, (layer, activation)| match activation {

@@ -9,6 +9,7 @@ use crate::{
     },
     policy::{
         NetInput,
+        entities::{ENTITIES, EntityEncoder, EntityKind, EntityShape},
         memory::{Memory, MemoryShape, Recall},
     },
     rng::Streams,
@@ -62,6 +63,8 @@ pub enum LogStd {
 pub struct Actor {
     /// The trunk that reads images, `cnn` in names; `None` for vectors.
     pub cnn: Option<ImageNet>,
+    /// The encoder of sets of things in vectors, `entities` in names, which actor and critic share; `None` without sets.
+    pub entities: Option<EntityEncoder>,
     /// The memory, `memory` in names, which actor and critic share; `None` without.
     pub memory: Option<Memory>,
     /// Hidden layers and the head.
@@ -118,7 +121,7 @@ impl Actor {
             StdShape::Squashed(low, high) => LogStd::Squashed { layer: layer()?, range: (low, high) },
             StdShape::Vector => LogStd::Vector(source.param(&name, [numbers], Init::Zeros)?),
         };
-        Ok(Self { cnn: None, memory: None, net, log_std, space })
+        Ok(Self { cnn: None, entities: None, memory: None, net, log_std, space })
     }
 
     /// Adds a memory, behind skills of width `latent`, that has no effect on the outputs yet.
@@ -134,8 +137,8 @@ impl Actor {
         Self { memory: Some(memory), ..self }
     }
 
-    /// Returns the width of what its layers read behind a skill of width `latent`: the numbers of a vector or the
-    /// features of an image, and the memory.
+    /// Returns the width of what its layers read behind a skill of width `latent`: the numbers of a vector, with the
+    /// features of its sets, or the features of an image, and the memory.
     pub(crate) fn obs_dim(&self, latent: usize) -> usize {
         self.net.inputs() - latent
     }
@@ -145,13 +148,18 @@ impl Actor {
         matches!(self.log_std, LogStd::Squashed { .. })
     }
 
-    /// Returns the input of the layers behind the trunk, `[n, obs_dim]`: vectors unchanged, images as features.
+    /// Returns the input of the layers behind the trunk, `[n, obs_dim]`: vectors unchanged except for their sets, images
+    /// as features.
     ///
     /// # Errors
-    /// [`LearnError::Config`] if the observations are of the other kind than the network.
+    /// [`LearnError::Config`] if the observations are of the other kind than the network; [`LearnError::Device`] if sets
+    /// cannot be read.
     pub fn observe(&self, states: &ObsBatch) -> Result<Tensor<2>, LearnError> {
         match (&self.cnn, states) {
-            (None, ObsBatch::Vector(x)) => Ok(x.clone()),
+            (None, ObsBatch::Vector(x)) => match &self.entities {
+                Some(entities) => entities.forward(x.clone()),
+                None => Ok(x.clone()),
+            },
             (Some(cnn), ObsBatch::Image(x)) => Ok(cnn.forward(x.clone())),
             (None, ObsBatch::Image(_)) => Err(LearnError::Config("a network for vectors got images".to_owned())),
             (Some(_), ObsBatch::Vector(_)) => Err(LearnError::Config("a network for images got vectors".to_owned())),
@@ -255,6 +263,9 @@ impl Parameters for Actor {
     fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
         if let Some(cnn) = &mut self.cnn {
             cnn.visit(&path(prefix, "cnn"), visitor);
+        }
+        if let Some(entities) = &mut self.entities {
+            entities.visit(&path(prefix, ENTITIES), visitor);
         }
         if let Some(memory) = &mut self.memory {
             memory.visit(&path(prefix, MEMORY), visitor);
@@ -410,6 +421,9 @@ pub(crate) struct ActorShape {
     /// The trunk that reads images; `None` for vectors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) cnn: Option<CnnKind>,
+    /// The encoder of sets of things; `None` without.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) entities: Option<EntityShape>,
     /// Its memory, if it has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) memory: Option<MemoryShape>,
@@ -429,7 +443,14 @@ impl ActorShape {
             ObsKind::Image(_) => (cnn.features(), Some(cnn.clone())),
         };
         let net = NetShape { obs_dim, latent: spec.latent, hidden: hidden.to_vec(), activation };
-        Self { net, std, cnn, memory: None }
+        Self { net, std, cnn, entities: None, memory: None }
+    }
+
+    /// Adds an encoder of the observation's sets, if it has any. A memory comes behind it.
+    pub(crate) fn with_entities(mut self, entities: &EntityKind) -> Self {
+        let shape = entities.shape(self.net.obs_dim).filter(|_| self.cnn.is_none());
+        self.net.obs_dim = shape.as_ref().map_or(self.net.obs_dim, EntityShape::features);
+        Self { entities: shape, ..self }
     }
 
     /// Adds a memory, if any.
@@ -439,9 +460,14 @@ impl ActorShape {
         Self { memory, ..self }
     }
 
-    /// Returns the width of the observations themselves, or the number of features.
+    /// Returns the width of the observations behind the encoder of their sets, or the number of an image's features.
     pub(crate) fn seen(&self) -> usize {
         self.memory.map_or(self.net.obs_dim, |memory| memory.seen(self.net.obs_dim))
+    }
+
+    /// Returns the width of the vectors that it observes.
+    pub(crate) fn observed(&self) -> usize {
+        self.entities.as_ref().map_or_else(|| self.seen(), |entities| entities.obs_dim)
     }
 
     /// Returns the shape of `actor`, which reads skills of width `latent`.
@@ -455,6 +481,7 @@ impl ActorShape {
             net: NetShape::of(&actor.net, actor.obs_dim(latent)),
             std,
             cnn: actor.cnn.as_ref().map(ImageNet::kind),
+            entities: actor.entities.as_ref().map(EntityEncoder::shape),
             memory: actor.memory.as_ref().map(Memory::shape),
         }
     }
@@ -464,7 +491,8 @@ impl ActorShape {
         NetShape::of(&critic.net, self.net.obs_dim)
     }
 
-    /// Creates an actor with starting weights from the stream `name`, and its trunk with some from `name.cnn`.
+    /// Creates an actor with starting weights from the stream `name`, its trunk with some from `name.cnn`, and the encoder
+    /// of its sets with some from `name.entities`.
     ///
     /// # Errors
     /// [`LearnError::Config`] if images are too small for the trunk.
@@ -481,10 +509,15 @@ impl ActorShape {
             }
             _ => None,
         };
+        let entities = self.entities.as_ref().map(|shape| {
+            let mut rng = streams.stream(&path(name, ENTITIES), 0);
+            let Ok(entities) = EntityEncoder::build(&mut RandomInit { rng: &mut rng, device }, "", shape);
+            entities
+        });
         let mut source = RandomInit { rng: &mut streams.stream(name, 0), device };
         let Ok(actor) = Actor::build(&mut source, "", &self.net, spec.action_space, self.std);
         let Ok(memory) = self.memory(&mut source, "");
-        Ok(Actor { cnn, memory, ..actor })
+        Ok(Actor { cnn, entities, memory, ..actor })
     }
 
     /// Reads the actor of this shape called `name` out of a file.
@@ -516,9 +549,18 @@ impl ActorShape {
                 return Err(file.format(format!("`{name}` reads images, but must read vectors")));
             }
         };
+        let entities = match &self.entities {
+            None => None,
+            Some(shape) => {
+                let latent = self.net.latent;
+                InputWidths { obs_dim: shape.features(), latent }.check(file, name, self.seen_widths())?;
+                let prefix = path(name, ENTITIES);
+                Some(EntityEncoder::stored(shape, &spec.obs, file, &prefix, device)?)
+            }
+        };
         let source = &mut file.params(device);
         let actor = Actor::build(source, name, &self.net, spec.action_space, self.std)?;
-        Ok(Actor { cnn, memory: self.memory(source, name)?, ..actor })
+        Ok(Actor { cnn, entities, memory: self.memory(source, name)?, ..actor })
     }
 
     /// Creates the memory of the actor called `name`, if it has one, with parameters out of `source`.

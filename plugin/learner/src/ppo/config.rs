@@ -5,10 +5,10 @@
 mod curiosity;
 
 use crate::{
-    Augmentation, LearnError, ObsKind, SettingError, TimeLimit,
+    Augmentation, EntityBlock, LearnError, ObsKind, SettingError, TimeLimit,
     nn::CnnKind,
     norm::{RewardNormalizer, RewardReset},
-    policy::MemoryKind,
+    policy::{EntityKind, MemoryKind},
     settings,
     settings::{Range, Reader, Settings},
 };
@@ -79,6 +79,11 @@ settings! {
     /// a copied decoder, whose observations are raw or, by `skills.norm_obs`, normalised by frozen statistics. Not
     /// for images, whose pixels are divided by 255.
     norm_obs: bool = false, by NETWORKS;
+    /// The way in which actor and critic read sets of things, such as enemies (`EntitySensor`). By `Set` every thing goes
+    /// through the same two layers of width `hidden`, and mean and maximum over all things join the other values: their
+    /// order is without effect. `Flat` reads the slots as other values. A copied decoder brings its own. Without effect
+    /// on observations without sets.
+    entities: EntityKind = EntityKind::default(), in Range::COUNT, by NETWORKS, off "settings::is_off";
     /// The memory of actor and critic. A policy that starts as a copy of the decoder has one that is without effect at
     /// first. `sequence` ticks are trained together, and `burn_in` is explained with them.
     memory: MemoryKind = MemoryKind::None, in Range::COUNT, by REMEMBERING, such as "Gru(hidden: 128)", off "settings::is_off";
@@ -139,7 +144,20 @@ impl PpoConfig {
             let text = "must not be a Stack for pictures: stack them with `image.stack`";
             return Err(SettingError::new("ppo.memory", text).into());
         }
+        EntityBlock::check_all(self.entities.blocks(), observation)?;
+        self.refuse_stack_of_sets(self.entities.blocks())?;
         self.augment.iter().try_for_each(|augmentation| augmentation.check("ppo.augment", observation))
+    }
+
+    /// Checks that no stack is wanted of sets that are read as sets.
+    ///
+    /// # Errors
+    /// [`LearnError::Setting`] if there is one.
+    pub(super) fn refuse_stack_of_sets(&self, sets: &[EntityBlock]) -> Result<(), LearnError> {
+        let (MemoryKind::Stack { .. }, [_, ..]) = (self.memory, sets) else { return Ok(()) };
+        let text = "must not be a Stack of sets of things, whose encoder changes while it learns: use a Gru, or set \
+                    `ppo.entities` and `skills.entities` to Flat";
+        Err(SettingError::new("ppo.memory", text).into())
     }
 
     /// Checks that neither memory nor an intrinsic reward is wanted, for a learner that has neither.

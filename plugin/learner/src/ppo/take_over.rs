@@ -41,7 +41,8 @@ impl PpoLearner {
             }
             _ => return differs("another `ppo.memory`"),
         };
-        let fit = Fit { inputs: &inputs, latent: own.latent, memory, is_refused: None };
+        let (behind, is_as_large) = inputs.behind(shape.entities.as_ref(), their_shape.entities.as_ref())?;
+        let fit = Fit { inputs: &behind, latent: own.latent, memory, is_refused: None };
         let of_critic = Fit { is_refused: (!start.critic).then_some(UNTRAINED), ..fit };
         let mut nets = frozen(&self.nets);
         let mut report = transplant(&mut nets.actor, &other.nets.actor, "actor", fit)?;
@@ -60,9 +61,9 @@ impl PpoLearner {
             tracing::warn!("the weights are taken, but behind {own:?} instead of {theirs:?} they are another policy");
         }
         report.join(transplant(&mut nets.critic, &other.nets.critic, "critic", of_critic)?);
-        report.new_inputs = inputs.fresh().count();
+        report.new_inputs = behind.fresh().count();
         self.take_curiosity(&mut nets, &other, &inputs, &mut report)?;
-        report.is_same_policy = is_whole && inputs.keeps_order();
+        report.is_same_policy = is_whole && behind.keeps_order() && is_as_large;
         if start.moments {
             let fits = [("actor", fit), ("critic", of_critic)];
             take_moments(&mut self.adam, &other.adam, &nets, &report.taken, &fits)?;

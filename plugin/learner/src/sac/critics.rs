@@ -247,7 +247,8 @@ fn actor_shape(config: &SacConfig, base: &LearnerBase) -> ActorShape {
     match base.copied_teacher() {
         Some(teacher) => teacher.shape(),
         None => {
-            ActorShape { net: actors_net(config, base), std: StdShape::Squashed(low, high), cnn: None, memory: None }
+            let (net, std) = (actors_net(config, base), StdShape::Squashed(low, high));
+            ActorShape { net, std, cnn: None, entities: None, memory: None }
         }
     }
 }

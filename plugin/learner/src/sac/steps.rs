@@ -258,6 +258,7 @@ pub(super) fn explorer(space: ActionSpace, inputs: usize, device: &Device) -> Ac
     };
     Actor {
         cnn: None,
+        entities: None,
         memory: None,
         space,
         net: Mlp { layers: Vec::new(), head: zeros(), activation: Activation::Relu },

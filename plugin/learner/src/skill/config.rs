@@ -1,9 +1,9 @@
 //! Settings of the skill model.
 
 use crate::{
-    ActionSpace, Actions, Augmentation, LearnError, ObsKind, SettingError,
+    ActionSpace, Actions, Augmentation, EntityBlock, LearnError, ObsKind, SettingError,
     nn::CnnKind,
-    policy::StdKind,
+    policy::{EntityKind, StdKind},
     settings,
     settings::{Range, Reader, Settings, is_off},
     skill::WindowRule,
@@ -37,6 +37,9 @@ settings! {
     beta: f64 = 0.1, in Range::WEIGHT;
     /// Hidden layers of the decoder and of the prior, ReLU.
     hidden: Vec<usize> = vec![200, 200], in Range::COUNT;
+    /// The way in which the three networks read sets of things: as `ppo.entities`. A policy that starts as a copy of the
+    /// decoder has its encoder. SAC reads values only, so with it the slots are always `Flat`.
+    entities: EntityKind = EntityKind::default(), in Range::COUNT, off "is_off";
     /// Width of the encoder's three per-step layers over vectors.
     encoder_hidden: usize = 64, in Range::COUNT;
     /// The convolutions over images; each of the three networks has its own. Not used for vectors.
@@ -154,6 +157,7 @@ impl SkillConfig {
     /// state.
     pub fn check_observation(&self, observation: ObsKind) -> Result<(), LearnError> {
         self.augment.iter().try_for_each(|augmentation| augmentation.check("skills.augment", &observation))?;
+        EntityBlock::check_all(self.entities.blocks(), &observation)?;
         match observation {
             ObsKind::Image(_) if self.norm_obs => {
                 let why = "is for vectors: the pixels of images are divided by 255 instead";

@@ -1,7 +1,7 @@
 //! Demonstrations for a skill model.
 
 use crate::{
-    ActionSpace, Actions, LearnError, ObsKind, Observations, SeenLevels, legacy, legal,
+    ActionSpace, Actions, EntityBlock, LearnError, ObsKind, Observations, SeenLevels, legacy, legal,
     norm::ObsStats,
     rng::{Streams, below, fnv1a, shuffle},
 };
@@ -152,14 +152,15 @@ impl Dataset {
         }
     }
 
-    /// Returns the mean and deviation of each number of the observations over all steps; `None` for images.
-    pub(super) fn stats(&self) -> Option<ObsStats> {
+    /// Returns the mean and deviation of each number of the observations over all steps; `None` for images. The things of
+    /// a set share theirs.
+    pub(super) fn stats(&self, sets: &[EntityBlock]) -> Option<ObsStats> {
         let ObsKind::Vector(width) = self.observation else { return None };
         let rows = self.episodes.iter().flat_map(|episode| match &episode.observations {
             Observations::Vector(values) => values.chunks_exact(width),
             Observations::Image(_) => [].chunks_exact(width),
         });
-        Some(ObsStats::of(rows, width))
+        Some(ObsStats::tied(rows, width, sets))
     }
 
     /// Returns a hash of all observations, actions, states and masks, the same on any number of threads.

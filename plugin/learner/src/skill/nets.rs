@@ -8,7 +8,7 @@ use crate::{
         ActionBatch, Dist, Gru, ImageNet, Linear, Mlp, ObsBatch, ParamSource, ParamVisitor, Parameters, RandomInit,
         path, vector,
     },
-    policy::Actor,
+    policy::{Actor, ENTITIES, EntityEncoder, EntityShape},
     rng::Streams,
     skill::{Dataset, SkillConfig, SkillDescription},
 };
@@ -219,6 +219,8 @@ impl Parameters for SkillNets {
 pub enum StateNet {
     /// Three layers over a vector, ReLU between them; `state` in names.
     Vector(Mlp),
+    /// The same behind the encoder of a vector's sets; `state.entities` in names.
+    Entities(EntityEncoder, Mlp),
     /// Convolutions over an image; `cnn` in names.
     Image(ImageNet),
 }
@@ -268,8 +270,16 @@ impl Encoder {
         let (state, features) = match observation {
             ObsKind::Vector(obs_dim) => {
                 let (name, width) = (path(prefix, "state"), config.encoder_hidden);
-                let net = Mlp::build(source, &name, obs_dim, &[width; 2], width, Activation::Relu, 1.0)?;
-                (StateNet::Vector(net), width)
+                let entities = config.entities.shape(obs_dim);
+                let inputs = entities.as_ref().map_or(obs_dim, EntityShape::features);
+                let net = Mlp::build(source, &name, inputs, &[width; 2], width, Activation::Relu, 1.0)?;
+                let state = match entities {
+                    None => StateNet::Vector(net),
+                    Some(shape) => {
+                        StateNet::Entities(EntityEncoder::build(source, &path(&name, ENTITIES), &shape)?, net)
+                    }
+                };
+                (state, width)
             }
             ObsKind::Image(image) => {
                 let net = ImageNet::build(source, &path(prefix, "cnn"), &config.cnn, image)?;
@@ -315,6 +325,7 @@ impl StateNet {
     pub fn forward(&self, states: &ObsBatch) -> Result<Tensor<2>, LearnError> {
         match (self, states) {
             (Self::Vector(net), ObsBatch::Vector(x)) => Ok(net.forward(x.clone())),
+            (Self::Entities(entities, net), ObsBatch::Vector(x)) => Ok(net.forward(entities.forward(x.clone())?)),
             (Self::Image(net), ObsBatch::Image(x)) => Ok(net.forward(x.clone())),
             _ => Err(LearnError::Config("the encoder got observations of the other kind".to_owned())),
         }
@@ -325,6 +336,11 @@ impl Parameters for Encoder {
     fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
         match &mut self.state {
             StateNet::Vector(net) => net.visit(&path(prefix, "state"), visitor),
+            StateNet::Entities(entities, net) => {
+                let name = path(prefix, "state");
+                entities.visit(&path(&name, ENTITIES), visitor);
+                net.visit(&name, visitor);
+            }
             StateNet::Image(net) => net.visit(&path(prefix, "cnn"), visitor),
         }
         self.gru.visit(&path(prefix, "gru"), visitor);

@@ -104,8 +104,8 @@ impl SkillTrainer {
         let (dataset, held_out) = dataset.without_held_out(&config, &streams)?;
         let windows = dataset.windows(config.window, config.windows, &streams, 0)?;
         Ok(Self {
-            state_stats: dataset.states.as_ref().and_then(|states| states.stats()),
-            stats: if config.norm_obs { dataset.stats().map(Arc::new) } else { None },
+            state_stats: dataset.states.as_ref().and_then(|states| states.stats(&[])),
+            stats: if config.norm_obs { dataset.stats(config.entities.blocks()).map(Arc::new) } else { None },
             nets: tracked(nets),
             adam: Adam::new(AdamConfig { eps: 1e-8, weight_decay: config.weight_decay, ..AdamConfig::default() }),
             epoch: 0,

@@ -40,6 +40,11 @@ impl Case {
         Self::read(&fixtures("action_spaces"), name)
     }
 
+    /// Creates the case of the script `tests/fixtures/entities/generate.py`, which no other folder has.
+    pub fn of_entities(name: &str) -> Self {
+        Self::read(&fixtures("entities"), name)
+    }
+
     /// Creates a case of the script `tests/fixtures/curiosity/generate.py`, which no other folder has.
     pub fn of_curiosity(name: &str) -> Self {
         Self::read(&fixtures("curiosity"), name)

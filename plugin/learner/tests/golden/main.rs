@@ -2,8 +2,8 @@
 //! principles.
 //!
 //! The cases of PyTorch lie in `tests/fixtures/numerics`, or in the folder that the environment variable
-//! `PLAYBOT_GOLDEN` names; those of variants of SAC, of curiosity, of memory and of action spaces lie in
-//! `tests/fixtures/sac_variants`, `curiosity`, `memory` and `action_spaces`, beside the scripts that make them.
+//! `PLAYBOT_GOLDEN` names; those of variants of SAC, of curiosity, of memory, of sets and of action spaces lie in
+//! `tests/fixtures/sac_variants`, `curiosity`, `memory`, `entities` and `action_spaces`, beside the scripts that make them.
 
 #![allow(clippy::disallowed_methods, reason = "tests compare with the system's functions")]
 
@@ -11,6 +11,7 @@ mod action_spaces;
 mod adam;
 mod case;
 mod curiosity;
+mod entities;
 mod fixed;
 mod gae;
 mod generated;

@@ -11,6 +11,7 @@ mod critic_trunk;
 mod curiosity;
 mod damaged_files;
 mod determinism;
+mod entities;
 mod errors;
 mod field;
 mod files;
