@@ -99,12 +99,14 @@ impl EntitySlots {
             _ if name.is_empty() || name.contains(['[', ']']) => {
                 Some(format!("the set `{name}` needs a name without brackets"))
             }
-            _ if *slots == 0 => Some(format!("the set `{name}` has no slots: give it as many as things matter at once")),
+            _ if *slots == 0 => {
+                Some(format!("the set `{name}` has no slots: give it as many as things matter at once"))
+            }
             _ if fields.is_empty() => Some(format!("the set `{name}` names no numbers of a thing")),
             (Some(field), _) => Some(format!("the set `{name}` names two numbers `{field}`")),
-            (None, Some(field)) => {
-                Some(format!("the set `{name}` names a number `{field}`: use a word without brackets other than `present`"))
-            }
+            (None, Some(field)) => Some(format!(
+                "the set `{name}` names a number `{field}`: use a word without brackets other than `present`"
+            )),
             (None, None) => None,
         }
     }
@@ -132,7 +134,9 @@ impl EntitySlots {
                 return Err(format!("`{field}` of thing {number} of the set `{name}` is {value}; it must be finite"));
             }
             if !distance.is_finite() {
-                return Err(format!("the distance of thing {number} of the set `{name}` is {distance}; it must be finite"));
+                return Err(format!(
+                    "the distance of thing {number} of the set `{name}` is {distance}; it must be finite"
+                ));
             }
         }
         things.sort_by(|(near, one), (far, other)| {
@@ -245,19 +249,20 @@ pub(crate) fn look(world: &mut World) {
 ///
 /// The fault of the sensor or of a thing, in words.
 fn look_around(world: &mut World, agent: Entity, sets: &[(EntitySlots, Look)]) -> Result<(), String> {
+    // Without a sensor of values the agent sees pictures.
+    let Some(names) = world.get::<VectorSensor>(agent).map(|sensor| &sensor.space().names) else { return Ok(()) };
     if let Some(problem) = sets.iter().find_map(|(slots, _)| slots.problem()) {
         return Err(problem);
     }
-    let names = || sets.iter().flat_map(|(slots, _)| slots.names());
     let width: usize = sets.iter().map(|(slots, _)| slots.len()).sum();
-    let own = match world.get::<VectorSensor>(agent).map(|sensor| &sensor.space().names) {
-        Some(all) if all.len() >= width && all[all.len() - width..].iter().cloned().eq(names()) => all.len() - width,
-        _ => {
-            return Err("an agent with an `EntitySensor` needs a `VectorSensor` whose last names are those of its sets: \
-                        make it with `VectorSensor::from_space(Arc::new(sensor.space(names)))`"
-                .to_owned());
-        }
-    };
+    let own = names.len().saturating_sub(width);
+    if !names[own..].iter().cloned().eq(sets.iter().flat_map(|(slots, _)| slots.names())) {
+        return Err(
+            "the last names of an agent's `VectorSensor` must be those of the sets of its `EntitySensor`: make it \
+                    with `VectorSensor::from_space(Arc::new(sensor.space(names)))`"
+                .to_owned(),
+        );
+    }
     let Some(mut vector) = world.get_mut::<Observation>(agent).map(|mut seen| std::mem::take(&mut seen.vector)) else {
         return Ok(());
     };
@@ -328,9 +333,10 @@ mod tests {
         }
         let (mut app, agent) = app(whole(), &[]);
         app.tick().expect("nothing there is no fault");
-        assert_eq!(app.world().get::<Observation>(agent).expect("every agent has one").vector, [
-            0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        ]);
+        assert_eq!(
+            app.world().get::<Observation>(agent).expect("every agent has one").vector,
+            [0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+        );
     }
 
     #[test]
@@ -343,10 +349,14 @@ mod tests {
 
     #[test]
     fn faults_name_the_set_and_the_thing() {
-        let fault = |sensor: VectorSensor, worths: &[f32]| app(sensor, worths).0.tick().expect_err("a fault").to_string();
+        let fault =
+            |sensor: VectorSensor, worths: &[f32]| app(sensor, worths).0.tick().expect_err("a fault").to_string();
         let text = fault(whole(), &[1.0, f32::NAN]);
-        assert!(text.starts_with("agent 0, level ") && text.contains("`worth` of thing 1 of the set `coin` is NaN"), "{text}");
-        assert!(fault(VectorSensor::new(["x"]), &[]).contains("needs a `VectorSensor` whose last names"));
+        assert!(
+            text.starts_with("agent 0, level ") && text.contains("`worth` of thing 1 of the set `coin` is NaN"),
+            "{text}"
+        );
+        assert!(fault(VectorSensor::new(["x"]), &[]).contains("the last names of an agent's `VectorSensor` must be"));
         let more = VectorSensor::from_space(Arc::new(coins().space(["x", "y"])));
         assert!(fault(more, &[]).contains("gave 1 values, and its sensor names 2 beside those of its sets"));
         let slots = EntitySlots::new("coin", 2, ["worth"]);

@@ -18,7 +18,7 @@ use playbot_train::{
 pub fn learn_skills(game: &dyn Game, experiment: &Experiment, threads: usize) -> SkillModel {
     let path = experiment.recordings().expect("recordings are named");
     let dataset = read_dataset(game, experiment, path, threads, &mut Unobserved).expect("readable");
-    let learned = learn(experiment, dataset, DeviceKind::Flex, None, &mut Unobserved).expect("learns");
+    let learned = learn(&experiment.with_sets(game), dataset, DeviceKind::Flex, None, &mut Unobserved).expect("learns");
     learned.expect("not stopped")
 }
 

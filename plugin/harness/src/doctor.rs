@@ -48,7 +48,7 @@ use std::collections::BTreeSet;
 pub use crate::doctor::{
     cause::{Cause, CauseKind},
     game_copy::TypesReport,
-    observed::{ConstantValue, NonFiniteValue, ObservationReport, Safety, Verdict},
+    observed::{ConstantValue, FullSet, NonFiniteValue, ObservationReport, Safety, Verdict},
     steps::UnequalSteps,
 };
 

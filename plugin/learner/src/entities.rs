@@ -137,6 +137,38 @@ impl EntitySet {
         }
         sets
     }
+
+    /// Returns the places of the same number in all slots, for a `place` in the set.
+    pub fn same_field(&self, place: usize) -> impl Iterator<Item = usize> + use<> {
+        let EntityBlock { start, slots, width } = self.block;
+        let field = place.saturating_sub(start) % (width + 1);
+        (0..slots).map(move |slot| start + slot * (width + 1) + field)
+    }
+
+    /// Returns whether `place` is a number of a slot that holds nothing in this observation.
+    pub fn is_absent(&self, place: usize, observation: &[f32]) -> bool {
+        let EntityBlock { start, width, .. } = self.block;
+        let slot = place.saturating_sub(start) / (width + 1);
+        let presence = start + slot * (width + 1);
+        let is_here = observation.get(presence).is_some_and(|present| *present > 0.5);
+        self.block.range().contains(&place) && place != presence && !is_here
+    }
+
+    /// Returns whether all slots of an observation hold a thing, so that others may have been left out.
+    pub fn is_full(&self, observation: &[f32]) -> bool {
+        self.same_field(self.block.start).all(|place| observation.get(place).is_some_and(|present| *present > 0.5))
+    }
+
+    /// Returns which values of an observation with these `sets` say nothing, if `is_constant` says which ones never
+    /// change. A number of a set says nothing if it is constant in all slots, and is then returned for the first one
+    /// alone: a slot that is always empty is no fault.
+    pub fn constant_values(sets: &[Self], values: usize, is_constant: impl Fn(usize) -> bool) -> Vec<usize> {
+        let says_nothing = |place: &usize| match sets.iter().find(|set| set.block.range().contains(place)) {
+            None => is_constant(*place),
+            Some(set) => set.same_field(*place).next() == Some(*place) && set.same_field(*place).all(&is_constant),
+        };
+        (0..values).filter(says_nothing).collect()
+    }
 }
 
 /// Writes it as `enemy: up to 8 with dx, dy`.
@@ -166,6 +198,24 @@ mod tests {
             ]
         );
         assert!(EntitySet::all_in(&["enemy 0 present", "enemy 0 dx"]).is_empty(), "names of another form");
+    }
+
+    #[test]
+    fn slots_that_are_always_empty_are_not_constant_values() {
+        let names: Vec<String> =
+            ["x".to_owned()].into_iter().chain(EntitySet::names("enemy", 3, &["dx", "dy"])).collect();
+        let sets = EntitySet::all_in(&names);
+        assert_eq!(sets[0].same_field(6).collect::<Vec<_>>(), [3, 6, 9]);
+        let constant = |varied: &[usize]| EntitySet::constant_values(&sets, 10, |place| !varied.contains(&place));
+        assert_eq!(constant(&[0, 1, 2, 3]), [] as [usize; 0], "one thing alone was ever seen");
+        assert_eq!(constant(&[1, 4, 2]), [0, 3], "nothing has ever been above or below");
+        assert_eq!(constant(&[]), [0, 1, 2, 3]);
+        let mut row = vec![0.0, 1.0, 0.5, 0.5, 1.0, 0.5, 0.5, 0.0, 0.0, 0.0];
+        assert!(!sets[0].is_full(&row));
+        let absent: Vec<usize> = (0..10).filter(|place| sets[0].is_absent(*place, &row)).collect();
+        assert_eq!(absent, [8, 9], "a presence is there, whatever it says");
+        row[7] = 1.0;
+        assert!(sets[0].is_full(&row));
     }
 
     #[test]

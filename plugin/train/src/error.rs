@@ -62,6 +62,14 @@ pub enum TrainError {
         /// Actions of the game.
         game_actions: Box<playbot_learner::ActionSpace>,
     },
+    /// The skill model reads sets of things that the game's observation does not have.
+    #[error(
+        "the skill model reads sets of things where `{game}` has none, or others: learn one from demonstrations of this game"
+    )]
+    OtherSets {
+        /// The game.
+        game: String,
+    },
     /// The skill model was learned from other pictures, or from vectors.
     #[error(
         "the skill model was learned from {model}, but `observation` and `image` of the experiment say {experiment}: \

@@ -25,7 +25,7 @@ use playbot_harness::{
     split::LevelSplit,
 };
 use playbot_learner::{
-    ImitationConfig, PpoConfig, RlpdConfig, SacConfig, ScoreConfig, SkillConfig, SpirlConfig, settings,
+    EntityKind, ImitationConfig, PpoConfig, RlpdConfig, SacConfig, ScoreConfig, SkillConfig, SpirlConfig, settings,
     settings::{Range, is_off},
 };
 use serde::{Deserialize, Serialize, Serializer};
@@ -222,6 +222,22 @@ impl Experiment {
             config.total_updates = config.total_updates.or_else(|| Some(self.updates()));
         }
         config
+    }
+
+    /// Returns the experiment with the sets of things that the game's observation has, for networks that read them as sets
+    /// (`ppo.entities`, `skills.entities`). SAC reads all values alike, and so do skills that it is tied to.
+    pub fn with_sets(&self, game: &dyn Game) -> Self {
+        let sets = match self.observation_config().is_image() {
+            true => Vec::new(),
+            false => game.observation().sets().into_iter().map(|set| set.block).collect::<Vec<_>>(),
+        };
+        let mut with = self.clone();
+        with.ppo.entities = self.ppo.entities.with_blocks(sets.clone());
+        with.skills.entities = match self.algorithm.learner() {
+            LearnerKind::Sac if !sets.is_empty() => EntityKind::Flat,
+            _ => self.skills.entities.with_blocks(sets),
+        };
+        with
     }
 
     /// Returns the ticks of one rollout.

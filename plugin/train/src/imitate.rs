@@ -250,7 +250,7 @@ impl<'a> Imitation<'a> {
             steps = LabelledSteps::of(&dataset)?;
             experiment.steps = (steps.len() as u64).saturating_mul(experiment.imitation.rounds).max(1);
         }
-        let learner = PpoLearner::new(experiment.ppo_config(), spec, experiment.seed, setup.device)?;
+        let learner = PpoLearner::new(experiment.with_sets(game).ppo_config(), spec, experiment.seed, setup.device)?;
         let new = NewRun { experiment: &experiment, from: None, ..*new };
         let info = run_info(game, &new, seen, setup)?;
         let run = RunDir::create(new.path, &experiment, &info, new.force)?;
@@ -291,7 +291,7 @@ impl<'a> Imitation<'a> {
                 (PpoLearner::load(&last.path.join(PRESENT), setup.device)?, progress, Some(best))
             }
             Err(RunError::NoCheckpoint { .. }) => {
-                let config = experiment.ppo_config();
+                let config = experiment.with_sets(game).ppo_config();
                 let learner = PpoLearner::new(config, spec, experiment.seed, setup.device)?;
                 (learner, ImitationProgress::default(), None)
             }

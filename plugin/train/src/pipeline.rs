@@ -197,12 +197,12 @@ pub fn learn_skills(
     observer: &mut dyn RunObserver,
 ) -> Result<SkillModel, PipelineError> {
     if file.exists() {
-        return finished_skills(experiment, file, setup);
+        return finished_skills(&experiment.with_sets(game), file, setup);
     }
     experiment.check_agent(game)?;
     let path = find_recordings(experiment, setup.recordings, observer)?;
     let dataset = read_dataset(game, experiment, &path, setup.threads, observer)?;
-    let learned = learn_into(file, experiment, dataset, setup.device, observer)?;
+    let learned = learn_into(file, &experiment.with_sets(game), dataset, setup.device, observer)?;
     learned.ok_or_else(|| PipelineError::Stopped(file.into()))
 }
 

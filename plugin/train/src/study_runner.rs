@@ -600,7 +600,8 @@ impl<'a> StudyRunner<'a> {
             if is_new {
                 learn_skills::remove_checkpoint(&learn_skills::checkpoint_of(&file))?;
             }
-            let learned = learn_skills::learn_into(&file, experiment, dataset, self.setup.device, observer)?;
+            let learned =
+                learn_skills::learn_into(&file, &experiment.with_sets(game), dataset, self.setup.device, observer)?;
             if learned.is_none() {
                 return Ok(None);
             }

@@ -621,7 +621,7 @@ impl TrainedLearner {
         demos: &[Rollout],
         device: DeviceKind,
     ) -> Result<Self, TrainError> {
-        let algorithm = experiment.algorithm;
+        let (experiment, algorithm) = (&experiment.with_sets(game), experiment.algorithm);
         let (seed, score) = (experiment.seed, experiment.score.clone());
         let spec =
             PolicySpec { obs: experiment.observation_config().obs_kind(game), latent: 0, action_space: game.actions() };
@@ -765,6 +765,11 @@ fn fitting<'a>(
             game_obs: observation,
             game_actions: action_space.into(),
         });
+    }
+    let sets: Vec<_> = game.observation().sets().into_iter().map(|set| set.block).collect();
+    let theirs = skills.config().entities.blocks();
+    if !theirs.is_empty() && theirs != sets {
+        return Err(TrainError::OtherSets { game: game.name().to_owned() });
     }
     match HeldOut::new(game, &experiment.test).shown_by(skills.demos()) {
         Some(seen) => Err(TrainError::SeenSkills { seen, test: experiment.test.clone() }),

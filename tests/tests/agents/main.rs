@@ -15,6 +15,7 @@ mod lander;
 mod leaps;
 mod lessons;
 mod level_detectors;
+mod meadow;
 mod memories;
 mod one_world;
 mod orders;

@@ -79,7 +79,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     }
     let own = own_options(&args);
     let options = Options { from: &args.from, own: &own };
-    let learned = learn_into(&args.out, &experiment, dataset, args.compute.device(), &mut console);
+    let learned = learn_into(&args.out, &experiment.with_sets(game), dataset, args.compute.device(), &mut console);
     let learned = learned.map_err(|error| explain(error, &options))?;
     console.result()?;
     if learned.is_none() {

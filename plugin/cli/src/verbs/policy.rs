@@ -19,7 +19,7 @@ use playbot_harness::{
     held_out::HeldOut,
     split::LevelSplit,
 };
-use playbot_learner::{DeviceKind, PolicyFile};
+use playbot_learner::{DeviceKind, EntitySet, PolicyFile};
 use playbot_report::{counted, whole};
 use playbot_train::{
     Experiment,
@@ -201,11 +201,20 @@ fn show(path: &Path, device: DeviceKind, as_json: bool, games: &Games) -> Result
     let skills = file.skills.as_ref();
     let game = games.get(&metadata.game);
     if as_json {
-        print_line(json!({
+        let mut all = json!({
             "card": metadata, "in_this_program": game.is_ok(), "action_space": policy.action_space(),
             "latent": policy.latent(),
             "horizon": skills.map(|skills| skills.skill_interval), "normalised": policy.normalises(),
-        }))?;
+        });
+        let sets = EntitySet::all_in(&metadata.observations);
+        if !sets.is_empty() {
+            let of_set = |set: &EntitySet| {
+                let read_as_set = policy.entities().contains(&set.block);
+                json!({ "name": set.name, "slots": set.block.slots, "fields": set.fields, "read_as_set": read_as_set })
+            };
+            all["sets"] = sets.iter().map(of_set).collect();
+        }
+        print_line(all)?;
         return Ok(Outcome::Pass);
     }
     let where_else = match game {
@@ -227,6 +236,10 @@ fn show(path: &Path, device: DeviceKind, as_json: bool, games: &Games) -> Result
             format!("observation   {}", output::with_names(&values, &metadata.observations))
         }
     })?;
+    for set in EntitySet::all_in(&metadata.observations) {
+        let alike = if policy.entities().contains(&set.block) { "" } else { ", read value by value" };
+        print_line(format!("set           {set}{alike}"))?;
+    }
     let actions = policy.action_space().to_string();
     print_line(format!("actions       {}", output::with_names(&actions, &metadata.actions)))?;
     print_line(match skills {

@@ -123,7 +123,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let dataset = read_dataset(game, &experiment, &demos, args.threads.count(), &mut Console::default())?;
     let _lock = take_folder(&args.run)?;
     report_length(&trained);
-    let Some(skills) = skills(&experiment, dataset.clone(), &args)? else {
+    let Some(skills) = skills(&experiment.with_sets(game), dataset.clone(), &args)? else {
         report!("stopped while learning skills; nothing was saved, start again with `{} quickstart`", program::name());
         return Ok(Outcome::Stopped);
     };
@@ -418,7 +418,7 @@ fn steps_of_seed(
     dataset: &Dataset,
     setup: &TrainingSetup<'_>,
 ) -> Result<Option<Vec<Option<u64>>>, CliError> {
-    let learned = learn(experiment, dataset.clone(), setup.device, None, &mut Console::default())?;
+    let learned = learn(&experiment.with_sets(game), dataset.clone(), setup.device, None, &mut Console::default())?;
     let Some(skills) = learned else { return Ok(None) };
     let mut all = Vec::new();
     for &algorithm in algorithms {

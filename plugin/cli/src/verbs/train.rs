@@ -265,7 +265,9 @@ fn equal_layouts(game: &dyn Game, train: &LevelSplit, test: &LevelSplit, seen: O
 /// Refuses settings of skills that differ from the model's, which was learned before. Settings of a file are not
 /// checked: they were those of `learn-skills` at that time.
 fn check_asked(args: &Args, experiment: &Experiment, model: &SkillModel) -> Result<(), CliError> {
-    let learned = Experiment { skills: model.config().clone(), ..experiment.clone() };
+    let mut learned = Experiment { skills: model.config().clone(), ..experiment.clone() };
+    // The sets are those of the game, and no option names them.
+    learned.skills.entities = learned.skills.entities.with_blocks(Vec::new());
     let asked = Experiment { skills: learned.with_set(&args.from.set)?.skills, ..experiment.clone() };
     let options = Options { from: &args.from, own: &[] };
     let differences = options.differences(&asked, &learned, "the skill model", &[]);
@@ -285,7 +287,10 @@ fn explain(error: TrainError, args: &Args, experiment: &Experiment, games: &Game
     let algorithm = match error {
         TrainError::NoSkills(algorithm) => algorithm,
         TrainError::Experiment(error) => return args.from.locate(games, args.settings(), error).into(),
-        TrainError::ForeignSkills { .. } | TrainError::SkillObservation { .. } | TrainError::SeenSkills { .. } => {
+        TrainError::ForeignSkills { .. }
+        | TrainError::OtherSets { .. }
+        | TrainError::SkillObservation { .. }
+        | TrainError::SeenSkills { .. } => {
             let file = args.skills.iter().map(|path| format!("{}: ", path.display())).collect::<String>();
             return CliError::Usage(format!("{file}{error}"));
         }

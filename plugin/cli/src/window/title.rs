@@ -15,7 +15,11 @@ use bevy::{
     window::PrimaryWindow,
     winit::WINIT_WINDOWS,
 };
-use bevy_playbot::{engine::{TappedKeys, run_observe_schedule}, episode::Tick, vision::VisionSystems};
+use bevy_playbot::{
+    engine::{TappedKeys, run_observe_schedule},
+    episode::Tick,
+    vision::VisionSystems,
+};
 use playbot_harness::prelude::*;
 use playbot_report::counted;
 use std::time::Duration;

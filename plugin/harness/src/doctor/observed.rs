@@ -1,6 +1,7 @@
 //! The observations of agents: values that are not numbers, that are sometimes missing, or that never change.
 
 use crate::doctor::{ComparisonReport, DoctorComparison, game_copy::Outcome};
+use bevy_playbot::entities::EntitySet;
 use serde::Serialize;
 
 /// A value that never changed while it was watched.
@@ -23,6 +24,17 @@ pub struct NonFiniteValue {
     pub value: String,
 }
 
+/// A set of things all of whose slots were taken, so that others may have been left out.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct FullSet {
+    /// Its name.
+    pub name: String,
+    /// Number of its slots.
+    pub slots: usize,
+    /// Ticks in which it was full.
+    pub ticks: u32,
+}
+
 /// The observations of one agent.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ObservationReport {
@@ -30,8 +42,15 @@ pub struct ObservationReport {
     pub values: usize,
     /// Ticks that were watched.
     pub ticks: u32,
-    /// Values that were the same in all of them.
+    /// Values that were the same in all of them; of a set of things those that were the same in all slots, by the name in
+    /// the first one.
     pub constant: Vec<ConstantValue>,
+    /// Sets of things that were full.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub full: Vec<FullSet>,
+    /// Values that never changed in slots of sets whose other slots did: a slot that stays empty is no fault.
+    #[serde(skip)]
+    pub unused: usize,
     /// The first value that was not a finite number.
     pub not_finite: Option<NonFiniteValue>,
     /// The first tick, from 0, with another number of values, and that number.
@@ -43,6 +62,9 @@ pub struct ObservationReport {
 /// Monitors one agent's observations.
 pub(super) struct ObservationMonitor {
     names: Vec<String>,
+    sets: Vec<EntitySet>,
+    /// Ticks in which each set was full.
+    full: Vec<u32>,
     first: Option<Outcome>,
     changed: Vec<bool>,
     image_changed: bool,
@@ -53,7 +75,9 @@ impl ObservationMonitor {
     /// Creates a monitor for values with these names.
     pub fn new(names: Vec<String>) -> Self {
         let report = ObservationReport { values: names.len(), ..Default::default() };
-        Self { changed: vec![false; names.len()], names, first: None, image_changed: false, report }
+        let sets = EntitySet::all_in(&names);
+        let (full, changed) = (vec![0; sets.len()], vec![false; names.len()]);
+        Self { changed, names, sets, full, first: None, image_changed: false, report }
     }
 
     /// Adds the outcome of a tick.
@@ -69,6 +93,9 @@ impl ObservationMonitor {
             let name = self.names.get(at).cloned().unwrap_or_else(|| format!("value {at}"));
             self.report.not_finite = Some(NonFiniteValue { tick, name, value: seen.observation[at].to_string() });
         }
+        for (set, ticks) in self.sets.iter().zip(&mut self.full) {
+            *ticks += u32::from(set.is_full(&seen.observation));
+        }
         let first = self.first.get_or_insert_with(|| seen.clone());
         for ((now, then), changed) in seen.observation.iter().zip(&first.observation).zip(&mut self.changed) {
             *changed |= now.to_bits() != then.to_bits();
@@ -80,14 +107,19 @@ impl ObservationMonitor {
     pub fn report(mut self) -> ObservationReport {
         if self.report.ticks > 1 {
             let values = self.first.map(|first| first.observation).unwrap_or_default();
-            let all = self.names.into_iter().zip(self.changed).enumerate();
-            let constant = all.filter(|(_, (_, changed))| !changed).map(|(at, (name, _))| ConstantValue {
-                name,
+            let constant = EntitySet::constant_values(&self.sets, self.names.len(), |at| !self.changed[at]);
+            let constant = constant.into_iter().map(|at| ConstantValue {
+                name: self.names[at].clone(),
                 // A value that was missing at first is unknown, and the report says so elsewhere.
                 value: values.get(at).copied().unwrap_or(f32::NAN),
             });
             self.report.constant = constant.collect();
+            let unchanged = self.changed.iter().filter(|changed| !**changed).count();
+            self.report.unused = unchanged.saturating_sub(self.report.constant.len());
         }
+        let full = self.sets.into_iter().zip(self.full).filter(|(_, ticks)| *ticks > 0);
+        let full = full.map(|(set, ticks)| FullSet { name: set.name, slots: set.block.slots, ticks });
+        self.report.full = full.collect();
         self.report
     }
 }
@@ -95,7 +127,7 @@ impl ObservationMonitor {
 impl ObservationReport {
     /// Returns whether there were values, and none of them ever changed.
     pub fn is_blind(&self) -> bool {
-        self.values > 0 && self.ticks > 1 && self.constant.len() == self.values
+        self.values > 0 && self.ticks > 1 && self.constant.len() + self.unused == self.values
     }
 }
 
@@ -212,6 +244,26 @@ mod tests {
         assert_eq!((report.constant.as_slice(), report.is_blind()), (&[always_five][..], false));
         assert!(report_on(&[&[1.0, 5.0], &[1.0, 5.0]]).is_blind());
         assert!(!report_on(&[&[1.0, 5.0]]).is_blind(), "one tick proves nothing");
+    }
+
+    #[test]
+    fn slots_that_stay_empty_are_no_constant_values_and_full_sets_are_noted() {
+        let slots = bevy_playbot::entities::EntitySlots::new("bee", 2, ["dx"]);
+        let report_on = |rows: &[[f32; 4]]| {
+            let mut monitor = ObservationMonitor::new(slots.names().collect());
+            for (tick, row) in rows.iter().enumerate() {
+                let seen = Outcome { observation: row.to_vec(), image: Vec::new(), reward: 0.0, hash: 0, end: None };
+                monitor.note(tick as u32, &seen);
+            }
+            monitor.report()
+        };
+        let one = report_on(&[[1.0, 0.5, 0.0, 0.0], [0.0; 4]]);
+        assert_eq!((one.constant.len(), one.full.len(), one.is_blind()), (0, 0, false));
+        let two = report_on(&[[1.0, 0.5, 1.0, 2.0], [1.0, 0.25, 1.0, 2.0]]);
+        let names: Vec<_> = two.constant.iter().map(|value| value.name.as_str()).collect();
+        assert_eq!(names, ["bee[0].present"]);
+        assert_eq!(two.full, [FullSet { name: "bee".to_owned(), slots: 2, ticks: 2 }]);
+        assert!(report_on(&[[0.0; 4], [0.0; 4]]).is_blind());
     }
 
     #[test]

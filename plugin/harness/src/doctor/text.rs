@@ -3,7 +3,7 @@
 use crate::doctor::{
     ComparisonReport, DoctorComparison, DoctorDifference, DoctorFinding, DoctorReport, forget_call,
     game_copy::TypesReport,
-    observed::{NonFiniteValue, ObservationReport, Verdict},
+    observed::{FullSet, NonFiniteValue, ObservationReport, Verdict},
 };
 use playbot_report::counted;
 use std::{
@@ -217,10 +217,16 @@ const LISTED: usize = 8;
 
 impl Display for ObservationReport {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let Self { values, ticks, constant, .. } = self;
+        let Self { values, ticks, constant, unused, .. } = self;
         let (all, in_ticks) = (counted(*values as u64, "value"), counted(u64::from(*ticks), "tick"));
         match constant.len() {
             _ if *ticks == 0 => writeln!(f, "Observation: {all}, none of which was seen")?,
+            0 if *unused > 0 => {
+                writeln!(
+                    f,
+                    "Observation: {all}, all of which changed in {in_ticks} but {unused} of slots that stayed empty"
+                )?;
+            }
             0 => writeln!(f, "Observation: {all}, all of which changed in {in_ticks}")?,
             count => writeln!(f, "Observation: {all}, {count} of which never changed in {in_ticks}")?,
         }
@@ -229,6 +235,14 @@ impl Display for ObservationReport {
         }
         if let Some((tick, count)) = self.length {
             writeln!(f, "  number of values          {count} at tick {tick}, where its sensor names {values}")?;
+        }
+        for FullSet { name, slots, ticks: full } in &self.full {
+            let (slots, full) = (counted(*slots as u64, "slot"), counted(u64::from(*full), "tick"));
+            writeln!(
+                f,
+                "  {:<26}full in {full}, with {slots}: things beyond the nearest are not observed; more slots show them",
+                quoted(name)
+            )?;
         }
         let lines = constant.iter().map(|it| format!("{:<26}always {}", quoted(&it.name), it.value));
         write_list(f, "  ", lines)

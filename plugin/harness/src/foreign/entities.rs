@@ -130,9 +130,12 @@ mod tests {
         assert_eq!(seen(&game(&flock)), Ok(vec![0.25, 1.0, -1.0, 0.75, 1.0, 3.0, 0.5]));
         assert_eq!(seen(&game(&flock[..1])), Ok(vec![0.25, 1.0, 3.0, 0.5, 0.0, 0.0, 0.0]));
         assert_eq!(seen(&game(&[])), Ok(vec![0.25, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]));
-        let alone = ForeignGame::new("dark", 1, |_: &mut App| {})
-            .keys([vec![], vec![KeyCode::Space]])
-            .entities("sheep", 1, ["dx"], || vec![(1.0, [2.0])]);
+        let alone = ForeignGame::new("dark", 1, |_: &mut App| {}).keys([vec![], vec![KeyCode::Space]]).entities(
+            "sheep",
+            1,
+            ["dx"],
+            || vec![(1.0, [2.0])],
+        );
         assert_eq!((alone.problem(), seen(&alone)), (None, Ok(vec![1.0, 2.0])));
     }
 
@@ -140,7 +143,10 @@ mod tests {
     fn faults_name_the_game_the_set_and_the_thing() {
         let fault = |around: &[(f32, &[f32])]| seen(&game(around)).expect_err("a fault");
         let text = fault(&[(1.0, &[1.0, 2.0]), (1.0, &[1.0])]);
-        assert!(text.contains("the game `meadow`") && text.contains("thing 1 of the set `sheep` has 1 numbers"), "{text}");
+        assert!(
+            text.contains("the game `meadow`") && text.contains("thing 1 of the set `sheep` has 1 numbers"),
+            "{text}"
+        );
         let text = fault(&[(1.0, &[f32::INFINITY, 2.0])]);
         assert!(text.contains("`dx` of thing 0 of the set `sheep` is inf"), "{text}");
     }

@@ -17,7 +17,7 @@ criterion::criterion_group! {
 criterion::criterion_group! {
     name = steps;
     config = data::measured(20);
-    targets = steps::skill, steps::mlp, steps::ppo, steps::images
+    targets = steps::skill, steps::mlp, steps::ppo, steps::entities, steps::images
 }
 criterion::criterion_group! {
     name = updates;

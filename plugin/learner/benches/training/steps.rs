@@ -5,10 +5,12 @@ use std::cell::LazyCell;
 use burn::tensor::{Tensor, TensorData};
 use criterion::Criterion;
 use playbot_learner::{
-    ActionSpace, Actions, Dataset, DatasetEpisode, PpoConfig, SkillConfig, SkillTrainer, StdKind, among_awake_workers,
+    ActionSpace, Actions, Dataset, DatasetEpisode, EntityBlock, EntityKind, PolicySpec, PpoConfig, PpoLearner,
+    SkillConfig, SkillTrainer, StdKind, among_awake_workers,
     nn::{ActionBatch, Activation, Adam, AdamConfig, CnnKind, ImageNet, Mlp, NamedGrads, tracked},
     policy::{Actor, Critic, NetShape},
     ppo::{Minibatch, PpoBatch, PpoNets, gradient_step},
+    rng::ChaCha8Rng,
 };
 
 use crate::data::{CHOICES, DEVICE, IMAGE, choices, images as image_tensor, matrix, normals, pixels, rng, tiles};
@@ -58,7 +60,44 @@ pub fn ppo(criterion: &mut Criterion) {
         critic: Critic::new(&shape, &mut rng, &device),
         intrinsic: None,
     });
-    let inputs = TensorData::new(tiles(rows * obs_dim, &mut rng), [rows, obs_dim]);
+    let inputs = tiles(rows * obs_dim, &mut rng);
+    ppo_step(criterion, "step/ppo-563-200-200-15/2048", &mut nets, (inputs, obs_dim), rng);
+}
+
+/// The same with 32 slots of five numbers, half of which hold a thing, read as a set and value by value.
+pub fn entities(criterion: &mut Criterion) {
+    let block = EntityBlock { start: 8, slots: 32, width: 5 };
+    let (obs_dim, rows) = (8 + block.numbers(), 2048);
+    let set = EntityKind::Set { hidden: 64, blocks: vec![block] };
+    for (name, entities) in [("set", set), ("flat", EntityKind::Flat)] {
+        let mut rng = rng("entities");
+        let mut inputs = normals(rows * obs_dim, &mut rng);
+        for row in inputs.chunks_exact_mut(obs_dim) {
+            for (slot, numbers) in row[block.range()].chunks_exact_mut(1 + block.width).enumerate() {
+                match slot % 2 {
+                    0 => numbers[0] = 1.0,
+                    _ => numbers.fill(0.0),
+                }
+            }
+        }
+        let spec = PolicySpec { obs: obs_dim.into(), latent: 0, action_space: ActionSpace::Discrete(CHOICES) };
+        let config = PpoConfig { entities, ..PpoConfig::default() };
+        let learner = PpoLearner::new(config, spec, 1, DEVICE).expect("fits");
+        let mut nets = tracked(learner.nets());
+        ppo_step(criterion, &format!("step/ppo-32-things-{name}/2048"), &mut nets, (inputs, obs_dim), rng);
+    }
+}
+
+/// Times gradient steps of PPO on random data.
+fn ppo_step(
+    criterion: &mut Criterion,
+    name: &str,
+    nets: &mut PpoNets,
+    (inputs, obs_dim): (Vec<f32>, usize),
+    mut rng: ChaCha8Rng,
+) {
+    let (rows, device) = (inputs.len() / obs_dim, DEVICE.plain());
+    let inputs = TensorData::new(inputs, [rows, obs_dim]);
     let actions = Actions::Discrete(choices(rows, &mut rng));
     let mut column = || Tensor::<1>::from_data(TensorData::new(normals(rows, &mut rng), [rows]), &device);
     let batch = Minibatch {
@@ -78,9 +117,9 @@ pub fn ppo(criterion: &mut Criterion) {
         intrinsic_returns: None,
     };
     let (config, mut adam) = (PpoConfig::default(), Adam::new(AdamConfig::default()));
-    criterion.bench_function("step/ppo-563-200-200-15/2048", |bencher| {
+    criterion.bench_function(name, |bencher| {
         among_awake_workers(|| {
-            bencher.iter(|| gradient_step(&mut nets, &mut adam, &batch, &config, None, 3e-4).expect("finite"));
+            bencher.iter(|| gradient_step(nets, &mut adam, &batch, &config, None, 3e-4).expect("finite"));
         });
     });
 }

@@ -159,13 +159,12 @@ fn train(learner: &mut PpoLearner, slots: usize, updates: usize, seed: u64) {
 /// Returns the share of right actions among `count` things in slots that `places` gives.
 fn right(policy: &Policy, count: usize, places: impl Fn(&mut ChaCha8Rng) -> Vec<usize>) -> f64 {
     let mut rng = Streams::new(99).stream("trial", count as u64);
-    let n = 2000;
-    let right = (0..n).filter(|_| {
-        let around = Around::draw(count, &mut rng);
-        let obs = around.observe(8, &places(&mut rng));
-        policy.forward(&[], &obs, 1).expect("finite").greedy(0) == ActionValue::Discrete(around.side())
-    });
-    right.count() as f64 / f64::from(n)
+    let trials: Vec<Around> = (0..2000).map(|_| Around::draw(count, &mut rng)).collect();
+    let obs: Vec<f32> = trials.iter().flat_map(|around| around.observe(8, &places(&mut rng))).collect();
+    let output = policy.forward(&[], &obs, trials.len()).expect("finite");
+    let chosen = trials.iter().enumerate().map(|(row, around)| (output.greedy(row), around.side()));
+    let right = chosen.filter(|(action, side)| *action == ActionValue::Discrete(*side)).count();
+    right as f64 / trials.len() as f64
 }
 
 #[test]
@@ -174,7 +173,7 @@ fn a_set_is_known_in_other_slots_and_numbers_and_a_flat_vector_is_not() {
         let shares = [set(32, 8), EntityKind::Flat].map(|entities| {
             let config = PpoConfig { hidden: vec![64, 64], ..config(entities) };
             let mut learner = learner_of(config, 8, seed, DeviceKind::Flex);
-            train(&mut learner, 8, 150, seed);
+            train(&mut learner, 8, 100, seed);
             let policy = learner.policy();
             [
                 right(&policy, 3, |_| vec![0, 1, 2]),
@@ -183,10 +182,10 @@ fn a_set_is_known_in_other_slots_and_numbers_and_a_flat_vector_is_not() {
             ]
         });
         let [[seen, moved, more], [flat_seen, flat_moved, flat_more]] = shares;
-        assert!(seen > 0.93 && flat_seen > 0.85, "both learn the task: {shares:?}");
-        assert_eq!(seen > 0.93, moved > 0.93, "{shares:?}");
-        assert!(more > 0.85, "six things, of which it has never seen more than three: {shares:?}");
-        assert!(flat_moved < 0.75 && flat_more < 0.75, "slots that were always empty mean nothing: {shares:?}");
+        assert!(seen > 0.93 && moved > 0.93, "{shares:?}");
+        assert!(more > 0.9, "six things, of which it has never seen more than three: {shares:?}");
+        // The flat vector learns slowly, and nothing about slots that were always empty.
+        assert!(flat_seen > 0.6 && flat_moved < flat_seen - 0.05 && flat_more < 0.65, "{shares:?}");
     }
 }
 

@@ -7,6 +7,7 @@ use crate::diagnose::{
     finding::{LearningFinding, Sign},
     play::{Played, PlayedEpisode, Seat},
 };
+use bevy_playbot::entities::EntitySet;
 use playbot_report::{counted, percent, readable, whole};
 
 /// Sizes of values that networks learn from without a normaliser. Constant values of another size do no harm.
@@ -86,6 +87,26 @@ pub fn statistics<'a>(rows: impl Iterator<Item = &'a [f32]>) -> Vec<ColumnStatis
     columns
 }
 
+/// Gives the numbers of a set's things the statistics over all slots, for those things that are there.
+fn share_in_sets<'a>(
+    columns: &mut [ColumnStatistics],
+    sets: &[EntitySet],
+    rows: impl Iterator<Item = &'a [f32]> + Clone,
+) {
+    for set in sets {
+        for field in set.block.start..=set.block.start + set.block.width {
+            let places: Vec<usize> = set.same_field(field).filter(|place| *place < columns.len()).collect();
+            let things = rows.clone().filter(|row| row.len() == columns.len()).flat_map(|row| {
+                let here = places.iter().filter(|place| !set.is_absent(**place, row));
+                here.map(|place| std::slice::from_ref(&row[*place])).collect::<Vec<_>>()
+            });
+            if let Some(shared) = statistics(things).first() {
+                places.iter().for_each(|place| columns[*place] = *shared);
+            }
+        }
+    }
+}
+
 /// Checks what agents observe.
 pub fn check(evidence: &Evidence) -> Vec<LearningFinding> {
     let rows = || evidence.played.iter().flat_map(|played| &played.episodes).flat_map(PlayedEpisode::rows);
@@ -120,7 +141,10 @@ fn recorded(evidence: &Evidence, width: usize) -> Vec<ColumnStatistics> {
     let Some(set) = &evidence.recordings else { return Vec::new() };
     let is_same = set.names.is_empty() || set.names == evidence.names;
     let kept = set.episodes.iter().filter(|episode| episode.width == width && is_same && width > 0);
-    statistics(kept.flat_map(|episode| episode.episode.observations.chunks(episode.width)))
+    let rows = || kept.clone().flat_map(|episode| episode.episode.observations.chunks(episode.width));
+    let mut columns = statistics(rows());
+    share_in_sets(&mut columns, &EntitySet::all_in(&evidence.names), rows());
+    columns
 }
 
 fn not_finite(evidence: &Evidence, columns: &[ColumnStatistics]) -> Vec<LearningFinding> {
@@ -141,7 +165,9 @@ fn not_finite(evidence: &Evidence, columns: &[ColumnStatistics]) -> Vec<Learning
 }
 
 fn constant(evidence: &Evidence, columns: &[ColumnStatistics]) -> Option<LearningFinding> {
-    let constants: Vec<usize> = (0..columns.len()).filter(|&number| columns[number].is_constant()).collect();
+    let sets = EntitySet::all_in(&evidence.names);
+    let is_constant = |number: usize| columns[number].is_constant();
+    let constants = EntitySet::constant_values(&sets, columns.len(), is_constant);
     let rows = columns.first().map_or(0, |column| column.rows);
     let varied: Vec<usize> = constants
         .iter()
@@ -150,7 +176,7 @@ fn constant(evidence: &Evidence, columns: &[ColumnStatistics]) -> Option<Learnin
         .collect();
     let shown = if varied.is_empty() { &constants } else { &varied };
     let names: Vec<String> = shown.iter().map(|&number| evidence.value_name(number)).collect();
-    let all = constants.len() == columns.len();
+    let all = (0..columns.len()).all(is_constant);
     if !all && varied.is_empty() {
         return None;
     }
@@ -213,9 +239,13 @@ fn not_as_recorded(evidence: &Evidence, recorded: &[ColumnStatistics]) -> Vec<Le
     let now = [Seat::Demonstrator, Seat::Policy].into_iter().find_map(|seat| evidence.played(seat));
     let (Some(Played { seat, episodes, .. }), false) = (now, recorded.is_empty()) else { return Vec::new() };
     let (mut beyond, mut values) = (vec![0_usize; recorded.len()], 0_usize);
+    let sets = EntitySet::all_in(&evidence.names);
     for row in episodes.iter().flat_map(PlayedEpisode::rows).filter(|row| row.len() == recorded.len()) {
         values += 1;
-        for ((count, column), value) in beyond.iter_mut().zip(recorded).zip(row) {
+        for (place, ((count, column), value)) in beyond.iter_mut().zip(recorded).zip(row).enumerate() {
+            if sets.iter().any(|set| set.is_absent(place, row)) {
+                continue;
+            }
             // A value that is rarely recorded lies many deviations from the mean, too.
             let is_known = (column.min..=column.max).contains(value);
             let is_far = (f64::from(*value) - column.mean).abs() > CLIPPED_AT * column.deviation;
@@ -304,6 +334,21 @@ mod tests {
         let found = check(&with_rows(|tick| vec![tick as f32, if tick == 7 { f32::NAN } else { 1.0 + tick as f32 }]));
         assert_eq!(found[0].sign, Sign::NotFinite);
         assert_eq!(found[0].evidence, "`speed` is NaN or infinite");
+    }
+
+    #[test]
+    fn slots_that_stay_empty_are_healthy_and_things_share_their_statistics() {
+        let mut evidence = with_rows(|tick| vec![tick as f32, 1.0, (tick % 7) as f32, 0.0, 0.0]);
+        let slots = bevy_playbot::entities::EntitySlots::new("bee", 2, ["dx"]);
+        evidence.names = ["x".to_owned()].into_iter().chain(slots.names()).collect();
+        assert_eq!(signs(&evidence), []);
+        let rows: [&[f32]; 3] = [&[0.0, 1.0, 2.0, 1.0, 4.0], &[0.0, 1.0, 3.0, 0.0, 0.0], &[0.0; 5]];
+        let mut columns = statistics(rows.into_iter());
+        share_in_sets(&mut columns, &EntitySet::all_in(&evidence.names), rows.into_iter());
+        let of_bees =
+            ColumnStatistics { rows: 3, not_finite: 0, min: 2.0, max: 4.0, mean: 3.0, deviation: columns[2].deviation };
+        assert_eq!((columns[2], columns[4]), (of_bees, of_bees));
+        assert!((columns[2].deviation - (2.0_f64 / 3.0).sqrt()).abs() < 1e-9);
     }
 
     #[test]

@@ -250,16 +250,17 @@ impl Experiment {
     /// Checks that the observations support `skills.augment`, `ppo.augment` and `skills.state_weight`.
     fn check_observation(&self, game: &dyn Game) -> Result<(), ExperimentError> {
         let kind = self.observation_config().obs_kind(game);
+        let with_sets = self.with_sets(game);
         self.check_painted_velocity()?;
         if self.algorithm.needs_skills() {
-            self.skills.check_observation(kind).map_err(settings)?;
+            with_sets.skills.check_observation(kind).map_err(settings)?;
             if self.skills.tells_states() && game.observation().is_empty() {
                 let why = "the game has no vector that its pictures could predict; leave it out";
                 return refuse("skills.state_weight", self.skills.state_weight, why);
             }
         }
         match self.algorithm.learner() {
-            LearnerKind::Ppo if self.algorithm.is_trained() => self.ppo.check_observation(&kind).map_err(settings),
+            LearnerKind::Ppo if self.algorithm.is_trained() => with_sets.ppo.check_observation(&kind).map_err(settings),
             _ => Ok(()),
         }
     }

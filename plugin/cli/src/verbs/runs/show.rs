@@ -8,6 +8,7 @@ use crate::{
     verbs::runs::{UNKNOWN, age_s, duration, to_json, write_plot},
 };
 use playbot_harness::games::Games;
+use playbot_learner::EntitySet;
 use playbot_report::{Chart, Curve, PlainTable, counted, readable, sparkline, to_svg, whole};
 use playbot_train::{
     Experiment,
@@ -125,6 +126,9 @@ fn print_head(run: &RunRecord, games: &Games) -> Result<(), CliError> {
         counted(u64::from(experiment.arenas), "arena"),
         counted(u64::from(experiment.worlds), "World")
     ))?;
+    for set in EntitySet::all_in(&info.observed) {
+        print_line(format!("sees a set of {set}"))?;
+    }
     print_line(describe_settings(experiment, games))?;
     for Checkpoint { path, summary } in &run.checkpoints {
         let value = rating(summary, &run.curves);
