@@ -27,6 +27,10 @@ struct TrainABot;
 struct AdaptYourGame;
 
 #[cfg(doctest)]
+#[doc = include_str!("../../docs/how-to/entities.md")]
+struct Entities;
+
+#[cfg(doctest)]
 #[doc = include_str!("../../docs/how-to/explore.md")]
 struct Explore;
 

@@ -1,6 +1,7 @@
 //! Sets of things: a task about the nearest one, and the exactness of their encoder.
 
 use crate::corridor;
+use crate::files::{after, describe};
 use playbot_learner::rng::{self, ChaCha8Rng, Streams, unit};
 use playbot_learner::{
     ActionSpace, ActionValue, Actions, Dataset, DatasetEpisode, DeviceKind, EntityBlock, EntityKind, EntitySet,
@@ -9,6 +10,7 @@ use playbot_learner::{
     among_awake_workers,
 };
 use std::ops::ControlFlow;
+use std::path::Path;
 
 /// Numbers of a thing: its distance to the right, and its colour, which is of no importance.
 const WIDTH: usize = 2;
@@ -353,6 +355,16 @@ fn a_policy_file_keeps_the_sets() {
     assert_eq!(EntitySet::all_in(&loaded.metadata.observations)[0].to_string(), "enemy: up to 6 with dx, colour");
     let of = |policy: &Policy| policy.forward(&[], &rows, 40).expect("finite");
     assert_eq!(of(&loaded.policy), of(&learner.policy()));
+    let load = |path: &Path| PolicyFile::load(path, DeviceKind::Flex).map(drop);
+    for (place, value, words) in [
+        ("/policy/actor/entities/blocks/0/start", 2, "lie in the 19 observed values"),
+        ("/policy/actor/entities/blocks/0/width", 3, "`actor` reads observations of"),
+        ("/policy/actor/entities/obs_dim", 20, "`actor` reads observations of"),
+        ("/policy/actor/entities/hidden", 15, "`actor` reads observations of"),
+    ] {
+        let error = after(&path, load, |contents| describe(contents, place, value.into())).to_string();
+        assert!(error.contains(words), "{place}: {error}");
+    }
 }
 
 #[test]
