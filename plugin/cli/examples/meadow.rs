@@ -132,18 +132,21 @@ fn grow(
     }
 }
 
-fn walk(mut agents: Query<(&Action, &mut Place, &Episode)>) {
-    for (action, mut at, episode) in &mut agents {
-        if episode.is_running() {
+fn walk(mut agents: Query<(&Action, &Control, &mut Place, &Episode)>) {
+    for (action, control, mut at, episode) in &mut agents {
+        if control.is_active() && episode.is_running() {
             let step = STEPS[action.discrete().unwrap_or_default() as usize % STEPS.len()];
             at.0 = (at.0 + STEP * step).clamp(Vec2::splat(-SIDE), Vec2::splat(SIDE));
         }
     }
 }
 
-/// Moves the wasps, which turn at the edge.
-fn fly(mut wasps: Query<(&mut Wasp, &mut Place)>) {
-    for (mut wasp, mut at) in &mut wasps {
+/// Moves the wasps of agents that play. They turn at the edge.
+fn fly(mut wasps: Query<(&mut Wasp, &mut Place, &Of)>, agents: Query<(&Control, &Episode)>) {
+    for (mut wasp, mut at, of) in &mut wasps {
+        if !agents.get(of.0).is_ok_and(|(control, episode)| control.is_active() && episode.is_running()) {
+            continue;
+        }
         let next = at.0 + wasp.0;
         let turned = Vec2::select(next.abs().cmpgt(Vec2::splat(SIDE)), -wasp.0, wasp.0);
         (wasp.0, at.0) = (turned, at.0 + turned);
@@ -152,11 +155,11 @@ fn fly(mut wasps: Query<(&mut Wasp, &mut Place)>) {
 
 fn touch(
     mut commands: Commands,
-    mut agents: Query<(Entity, &Place, &mut Reward, &mut Episode, &mut StateHash)>,
+    mut agents: Query<(Entity, &Control, &Place, &mut Reward, &mut Episode, &mut StateHash)>,
     things: Query<(Entity, &Place, &Of, Has<Berry>), Without<Agent>>,
 ) {
-    for (agent, at, mut reward, mut episode, mut hash) in &mut agents {
-        if !episode.is_running() {
+    for (agent, control, at, mut reward, mut episode, mut hash) in &mut agents {
+        if !control.is_active() || !episode.is_running() {
             continue;
         }
         let (mut left, mut is_stung, mut state) =

@@ -16,7 +16,8 @@
 //!   prior.
 //! - Training code is independent of the algorithm: all implement [`Learner`].
 //!
-//! Observations are vectors or images ([`ObsKind`]); SAC alone reads only vectors. Rows are flat `f32` slices in host
+//! Observations are vectors or images ([`ObsKind`]); SAC alone reads only vectors. Vectors may hold sets of things
+//! ([`EntitySet`]). Rows are flat `f32` slices in host
 //! memory (bytes for pixels), row-major ([`ObsSlice`]). All randomness comes from generators that the caller owns or
 //! from the named [`rng::Streams`] of one seed. The same seed gives the same numbers, whatever the number of threads.
 //!

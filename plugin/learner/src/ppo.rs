@@ -136,8 +136,9 @@ impl PpoLearner {
         let rewards = config.norm_reward.then(|| config.reward_normalizer());
         let mut base = LearnerBase::new(spec, teacher, rewards, config.norm_obs, seed, device)?;
         base.observations = base.observations.map(|normalizer| normalizer.tied(config.entities.blocks()));
-        let copied = base.copied_teacher().map(|teacher| teacher.description.config.entities.blocks());
-        config.refuse_stack_of_sets(copied.unwrap_or(config.entities.blocks()))?;
+        if let Some(teacher) = &base.teacher {
+            config.check_sets(&teacher.description.config, teacher.is_copied())?;
+        }
         Ok(base)
     }
 

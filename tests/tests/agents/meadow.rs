@@ -36,7 +36,7 @@ fn experiment(algorithm: Algorithm) -> Experiment {
 }
 
 fn skills(folder: &Path, algorithm: Algorithm) -> SkillModel {
-    let path = folder.join("walk.demo");
+    let path = folder.join(format!("{algorithm}.demo"));
     record_random(&Meadow, "few", 5, &path, 16..40);
     let report = verify_file(&Meadow, &path, |_| {}).expect("readable");
     assert!(report.ticks > 50 && report.divergences.is_empty(), "{report:?}");

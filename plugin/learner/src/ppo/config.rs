@@ -11,6 +11,7 @@ use crate::{
     policy::{EntityKind, MemoryKind},
     settings,
     settings::{Range, Reader, Settings},
+    skill::SkillConfig,
 };
 use playbot_kernels::elementwise::Activation;
 
@@ -149,11 +150,28 @@ impl PpoConfig {
         self.augment.iter().try_for_each(|augmentation| augmentation.check("ppo.augment", observation))
     }
 
+    /// Checks that these settings of sets go together with those of a skill model, of which the policy is a copy or not.
+    ///
+    /// # Errors
+    /// [`LearnError::Setting`] names the setting to change.
+    pub(super) fn check_sets(&self, skills: &SkillConfig, is_copied: bool) -> Result<(), LearnError> {
+        let (own, theirs) = (self.entities.blocks(), skills.entities.blocks());
+        if is_copied {
+            return self.refuse_stack_of_sets(theirs);
+        }
+        if skills.norm_obs && !own.is_empty() && own != theirs {
+            let text = "must be like `skills.entities`, as the policy sees through the frozen normaliser of its skills: make \
+                        both `Set` or both `Flat`";
+            return Err(SettingError::new("ppo.entities", text).into());
+        }
+        Ok(())
+    }
+
     /// Checks that no stack is wanted of sets that are read as sets.
     ///
     /// # Errors
     /// [`LearnError::Setting`] if there is one.
-    pub(super) fn refuse_stack_of_sets(&self, sets: &[EntityBlock]) -> Result<(), LearnError> {
+    fn refuse_stack_of_sets(&self, sets: &[EntityBlock]) -> Result<(), LearnError> {
         let (MemoryKind::Stack { .. }, [_, ..]) = (self.memory, sets) else { return Ok(()) };
         let text = "must not be a Stack of sets of things, whose encoder changes while it learns: use a Gru, or set \
                     `ppo.entities` and `skills.entities` to Flat";

@@ -507,6 +507,22 @@ fn a_policy_over_sets_starts_as_an_exact_copy_of_the_decoder() {
 }
 
 #[test]
+fn a_policy_sees_sets_through_a_normaliser_that_knows_them() {
+    let of_flat = |norm_obs| {
+        let config = SkillConfig { norm_obs, entities: EntityKind::Flat, ..crate::skill::config() };
+        SkillTrainer::new(config, demos(5, None), 1, DeviceKind::Flex).expect("windows fit").into_model()
+    };
+    let score = Score { init_from_decoder: false, ..Score::default() };
+    let learner = |model: &SkillModel, entities| {
+        PpoLearner::with_skill(config(entities), score.clone(), model, 1, DeviceKind::Flex)
+    };
+    let error = learner(&of_flat(true), set(16, 5)).expect_err("presences would be normalised").to_string();
+    assert!(error.contains("`ppo.entities` must be like `skills.entities`"), "{error}");
+    assert!(learner(&of_flat(true), EntityKind::Flat).is_ok() && learner(&of_flat(false), set(16, 5)).is_ok());
+    assert!(learner(&skills(true, None).into_model(), set(7, 5)).is_ok());
+}
+
+#[test]
 fn a_score_learner_of_sets_goes_on_bit_for_bit() {
     let model = skills(false, None).into_model();
     let learner = PpoLearner::with_skill(config(set(16, 5)), Score::default(), &model, 1, DeviceKind::Flex);
