@@ -245,6 +245,7 @@ mod tests {
                 "LegalActions",
                 "LevelQueue",
                 "NoTimeLimit",
+                "OwnPolicy",
                 "RandomisedValues",
                 "Recording",
                 "RedrawsIllegal",

@@ -9,7 +9,7 @@
 //! |---|---|
 //! | drive a World without an app | [`headless_frame_app`], [`into_world`], [`run_on_one_thread`], [`tick_world`] |
 //! | begin an episode in a World as new | [`Renewal`], [`NextEpisode`], [`EpisodeSeeds`], [`LevelFiles`] |
-//! | let other agents play along | [`PlaysAlong`], [`begin_beside`] |
+//! | let other agents play along | [`PlaysAlong`], [`begin_beside`], [`OwnPolicy`] |
 //! | find the tick of a game, whatever its frames | [`TickSchedules`], [`is_tick`], [`set_tick_rate`] |
 //! | survive a game that panics or logs errors | [`panics`], [`system_errors`] |
 //! | name the tick in which a game logs a message | [`tick_of_thread`], [`LevelTick`] |
@@ -70,6 +70,7 @@ pub use crate::{
         TasksEndWithFrames, UnloadedAssets, deliver_assets, deliver_between_frames, tasks_in_order, wait_for_assets,
         wait_for_tasks,
     },
+    own_policy::OwnPolicy,
     policy_batch::{Playing, PolicyBatch, PolicyRows, SharedBatch},
     renewal::{NextEpisode, Renewal},
 };

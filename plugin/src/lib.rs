@@ -106,6 +106,7 @@ pub mod lesson;
 pub mod level;
 mod loading;
 pub mod observation;
+mod own_policy;
 #[cfg(feature = "overlay")]
 pub mod overlay;
 mod panics;

@@ -16,7 +16,7 @@ use crate::{
     action, agent, bot, entities, episode,
     fault::{FaultSystems, Faults, announce_faults},
     key_bindings::KeyboardPlugin,
-    legal, observation, placement,
+    legal, observation, own_policy, placement,
     placement::{FrameGate, TickPlacement, TickSchedules},
     policy, reward, skill_prior, streams,
     systems::{ObserveSchedule, PlaybotSystems, run_observe_schedule},
@@ -114,6 +114,7 @@ fn add_decision_systems(app: &mut App, schedule: impl ScheduleLabel) {
                 crate::demo::replay::run_replays,
                 skill_prior::draw_skills.run_if(resource_exists::<skill_prior::SkillPrior>),
                 policy::run_policy.run_if(resource_exists::<policy::ActivePolicy>),
+                own_policy::run_own_policies.run_if(any_with_component::<own_policy::OwnPolicy>),
             )
                 .chain()
                 .in_set(PlaybotSystems::Decide),

@@ -32,6 +32,7 @@ use crate::{
     fault::Faults,
     legal::LegalActions,
     observation::Observation,
+    own_policy::OwnPolicy,
     policy_batch::{PolicyBatch, SharedBatch},
     skill_prior::{ActiveSkill, SkillPrior},
     streams::AgentStreams,
@@ -104,21 +105,25 @@ pub(crate) fn forget(mut agents: Query<(&Episode, &mut AgentMemory)>) {
     }
 }
 
-/// Decides for all agents under [`Control::Policy`] in one batched forward pass, among their [`LegalActions`].
+/// Decides for all agents under [`Control::Policy`] in one batched forward pass, among their [`LegalActions`]. Those with
+/// an [`OwnPolicy`] are left to it.
 pub(crate) fn run_policy(
     active: Res<ActivePolicy>,
     (shared, prior): (Option<Res<SharedBatch>>, Option<Res<SkillPrior>>),
     order: Res<AgentOrder>,
-    mut agents: Query<(
-        &Agent,
-        &Control,
-        &Episode,
-        (&Observation, Option<&ImageSensor>, Option<&LegalActions>),
-        (&ActiveSkill, Option<&mut AgentMemory>),
-        &mut AgentStreams,
-        &mut Action,
-        &mut Decision,
-    )>,
+    mut agents: Query<
+        (
+            &Agent,
+            &Control,
+            &Episode,
+            (&Observation, Option<&ImageSensor>, Option<&LegalActions>),
+            (&ActiveSkill, Option<&mut AgentMemory>),
+            &mut AgentStreams,
+            &mut Action,
+            &mut Decision,
+        ),
+        Without<OwnPolicy>,
+    >,
     mut faults: ResMut<Faults>,
     mut batch: ResMut<PolicyBatch>,
 ) {
@@ -174,7 +179,7 @@ pub(crate) fn run_policy(
 }
 
 /// Returns why the policy cannot decide for this agent.
-fn misfit(
+pub(crate) fn misfit(
     policy: &Policy,
     agent: &Agent,
     observation: &Observation,

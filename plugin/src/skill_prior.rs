@@ -25,6 +25,7 @@ use crate::{
     episode::Episode,
     fault::Faults,
     observation::Observation,
+    own_policy::OwnPolicy,
     streams::AgentStreams,
     vision::{ImageSensor, seen_as},
 };
@@ -152,7 +153,10 @@ pub(crate) fn end_skills(mut agents: Query<(&Episode, &mut ActiveSkill)>) {
 pub fn draw_skills(
     prior: Res<SkillPrior>,
     order: Res<AgentOrder>,
-    mut agents: Query<(&Agent, &Control, &Episode, &Observation, &mut ActiveSkill, &mut AgentStreams)>,
+    mut agents: Query<
+        (&Agent, &Control, &Episode, &Observation, &mut ActiveSkill, &mut AgentStreams),
+        Without<OwnPolicy>,
+    >,
     sensors: Query<&ImageSensor>,
     mut faults: ResMut<Faults>,
 ) {

@@ -79,7 +79,7 @@ use crate::{
     defect::DefectKind,
     detector::Detector,
     foreign::{
-        agents::{SharingAgents, add_agents_along},
+        agents::{SharingAgents, add_agents_along, place_of},
         description::{Description, ForeignPlugin, nothing_seen},
         entities::problem_of,
         input::{ForeignBot, Input},
@@ -647,6 +647,23 @@ impl HostTools for ForeignGame {
         u32::try_from(self.description.agents.count()).unwrap_or(u32::MAX)
     }
 
+    fn seats(&self) -> Vec<String> {
+        self.description.agents.seats()
+    }
+
+    fn teams(&self) -> Vec<usize> {
+        self.description.agents.teams()
+    }
+
+    fn seated(&self, seat: usize) -> Option<Arc<dyn Game>> {
+        let name = self.description.agents.seats().get(seat)?.clone();
+        Some(Arc::new(self.clone().first_agent(name)))
+    }
+
+    fn seat_of(&self, world: &World, agent: Entity) -> usize {
+        place_of(world, agent)
+    }
+
     fn add_agents_along(&self, world: &mut World) {
         add_agents_along(self, world);
     }
@@ -716,6 +733,11 @@ impl BotTools for ForeignGame {
     fn attach_scripted(&self, world: &mut World, agent: Entity, name: &'static str) {
         Renewal::carry_component::<ForeignBot>(world);
         world.entity_mut(agent).insert(ForeignBot { name: Some(name), noise: 0.0 });
+    }
+
+    fn detach(&self, world: &mut World, agent: Entity) {
+        Renewal::carry_component::<ForeignBot>(world);
+        world.entity_mut(agent).remove::<ForeignBot>();
     }
 }
 

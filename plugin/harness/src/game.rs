@@ -308,6 +308,29 @@ pub trait HostTools: Send + Sync {
         1
     }
 
+    /// Returns the names of the seats of an arena that several agents share, in the order in which
+    /// [`spawn_agent`](Game::spawn_agent) gives them away. By default there are none, for a game of one agent.
+    fn seats(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Returns the team of each seat, as a number: seats of one team win together. By default each seat is a team of its
+    /// own.
+    fn teams(&self) -> Vec<usize> {
+        (0..self.seats().len()).collect()
+    }
+
+    /// Returns the game again, with its first agent on this seat, so that each seat can be played while the others
+    /// [play along](Self::add_agents_along). Returns `None`, by default, for a game of one agent.
+    fn seated(&self, _seat: usize) -> Option<Arc<dyn Game>> {
+        None
+    }
+
+    /// Returns the seat of an agent, as a place in [`seats`](Self::seats); by default the first one.
+    fn seat_of(&self, _world: &World, _agent: Entity) -> usize {
+        0
+    }
+
     /// Adds the agents that are missing in a World of fewer agents than share an arena. They play along, as
     /// [`PlaysAlong`](bevy_playbot::engine::PlaysAlong) says, in a way that depends on nothing but the level and what the
     /// others do. So a recording of the first agent replays.
@@ -622,6 +645,10 @@ pub trait BotTools: Send + Sync {
 
     /// Hands an agent over to one of the [`scripted_bots`](Self::scripted_bots).
     fn attach_scripted(&self, _world: &mut World, _agent: Entity, _name: &'static str) {}
+
+    /// Takes an agent away from its demonstrator or scripted bot, before another player gets it. By default this does
+    /// nothing, for bots that leave agents alone which are not under [`Control::Bot`](bevy_playbot::agent::Control::Bot).
+    fn detach(&self, _world: &mut World, _agent: Entity) {}
 }
 
 /// Detectors and planted defects of a game.

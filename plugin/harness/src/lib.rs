@@ -13,7 +13,7 @@
 //! - its Worlds: [`worlds`], headless Worlds with any number of agents, and the episodes that ended in them;
 //!   [`sensors`], what their agents see; [`saved_episode`], episodes that are saved in the middle;
 //!   [`randomise`], values of the game that each level draws anew.
-//! - its players: [`eval`], evaluation of players on levels; [`demo`], recordings made and verified; [`detector`], the
+//! - its players: [`eval`], evaluation of players on levels; [`rivals`], players of other seats, and matches with them; [`demo`], recordings made and verified; [`detector`], the
 //!   contract of detectors of defects; [`defect`], the kinds of planted defects.
 //! - views: [`doctor`], the examination of a game's determinism; [`inspect`], single levels and steps; [`trace`], given
 //!   actions tick by tick; [`drawing`], shapes as SVG or pixels; [`trails`], charts of where agents went.
@@ -65,6 +65,7 @@ pub mod parallel;
 pub mod prelude;
 pub mod randomise;
 mod reflected_path;
+pub mod rivals;
 pub mod saved_episode;
 pub mod sealed_file;
 pub mod sensors;

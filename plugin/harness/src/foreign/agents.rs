@@ -87,6 +87,31 @@ impl ForeignGame {
         self.with(|description| description.agents.first = Some(name.into()))
     }
 
+    /// Puts the [`agents`](Self::agents) into teams that win together. Default: each agent is a team of its own. Where a
+    /// policy learns or is measured against rivals, agents of its own team are no rivals.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_harness::{foreign::{ForeignGame, PlayedAgent}, prelude::*};
+    ///
+    /// let pairs = |second: [&'static str; 2]| {
+    ///     let keys = [KeyCode::KeyQ, KeyCode::KeyP, KeyCode::KeyA, KeyCode::KeyL];
+    ///     let game = ForeignGame::new("doubles", 1, |_: &mut App| {})
+    ///         .agents(["north", "east", "south", "west"])
+    ///         .teams([["north", "south"], second])
+    ///         .observe(["side"], |agent: Res<PlayedAgent>| [agent.0 as f32]);
+    ///     let named = ["north", "east", "south", "west"].into_iter().zip(keys);
+    ///     named.fold(game, |game, (name, key)| game.keys_of(name, [vec![], vec![key]]))
+    /// };
+    /// assert_eq!(pairs(["east", "west"]).tools().host.teams(), [0, 1, 0, 1]);
+    /// let problem = pairs(["east", "wets"]).problem().expect("there is no such agent");
+    /// assert!(problem.contains("did you mean `west`?"), "{problem}");
+    /// ```
+    pub fn teams(self, teams: impl IntoIterator<Item = impl IntoIterator<Item = impl Into<String>>>) -> Self {
+        let teams = teams.into_iter().map(|team| team.into_iter().map(Into::into).collect()).collect();
+        self.with(|description| description.agents.teams = Some(teams))
+    }
+
     /// Replaces the sets of [`keys`](Self::keys) for one of the [`agents`](Self::agents): as many, in the same order.
     pub fn keys_of(
         self,
@@ -127,6 +152,8 @@ pub(super) struct SharingAgents {
     names: Option<Vec<String>>,
     /// The agent that is spawned first, if it is not the first of the names.
     first: Option<String>,
+    /// The names of each team; `None` if each agent is a team of its own.
+    teams: Option<Vec<Vec<String>>>,
     own: Vec<(String, OwnInput)>,
 }
 
@@ -138,6 +165,21 @@ impl SharingAgents {
     /// Returns the number of agents in a World.
     pub(super) fn count(&self) -> usize {
         self.names().len().max(1)
+    }
+
+    /// Returns the names of agents that share a World; none if an agent is alone in it.
+    pub(super) fn seats(&self) -> Vec<String> {
+        if self.count() > 1 { self.names().to_vec() } else { Vec::new() }
+    }
+
+    /// Returns the team of each seat.
+    pub(super) fn teams(&self) -> Vec<usize> {
+        let seats = self.seats();
+        let team_of = |(seat, name): (usize, &String)| {
+            let team = self.teams.iter().flatten().position(|team| team.contains(name));
+            team.unwrap_or(seat)
+        };
+        seats.iter().enumerate().map(team_of).collect()
     }
 
     /// Returns the place of the agent that is spawned after so many others.
@@ -196,7 +238,9 @@ impl SharingAgents {
         }
         let first = self.first.iter().map(|agent| ("`.first_agent`", agent));
         let own = self.own.iter().map(|(agent, own)| (own.method(), agent));
-        let (method, agent) = own.chain(first).find(|(_, agent)| !names.contains(agent))?;
+        let in_teams = self.teams.iter().flatten().flatten().map(|agent| ("`.teams`", agent));
+        let unknown = own.chain(first).chain(in_teams).find(|(_, agent)| !names.contains(agent));
+        let Some((method, agent)) = unknown else { return self.problem_of_teams() };
         if names.is_empty() {
             return Some(format!("has {method} for the agent `{agent}`, and names no agents: add `.agents`"));
         }
@@ -204,6 +248,21 @@ impl SharingAgents {
         let near = question(nearest(agent, &known));
         let known = known.join("`, `");
         Some(format!("has {method} for an agent `{agent}`{near}, and `.agents` names `{known}`"))
+    }
+
+    /// Returns why the teams are no teams of all agents.
+    fn problem_of_teams(&self) -> Option<String> {
+        let teams = self.teams.as_ref()?;
+        for name in self.names() {
+            match teams.iter().flatten().filter(|member| *member == name).count() {
+                1 => {}
+                0 => return Some(format!("has no team for the agent `{name}`: name it in one of `.teams`")),
+                _ => return Some(format!("names the agent `{name}` twice in `.teams`: an agent is in one team")),
+            }
+        }
+        (teams.iter().filter(|team| !team.is_empty()).count() < 2).then(|| {
+            "has one team in `.teams`, and so no rivals: name two teams or more, or leave `.teams` out".to_owned()
+        })
     }
 
     /// Returns why the agents cannot act together: they have different actions, or share an input.
@@ -263,10 +322,15 @@ pub(super) fn begin_agents_along(world: &mut World, level: u64) {
         begin_beside(world, other, level);
         world.entity_mut(other).insert(AgentStreams::new(seed, place as u32));
         with_foreign(world, other, |_, foreign| {
-            foreign.renew_demonstrator();
+            foreign.renew_bots();
             Ok(())
         });
     }
+}
+
+/// Returns the place of an agent among those of its World.
+pub(super) fn place_of(world: &World, agent: Entity) -> usize {
+    world.get::<AgentPlace>(agent).map_or(0, |place| place.0)
 }
 
 /// Makes agents that play along wait for the next episode.

@@ -207,10 +207,12 @@ impl Foreign {
         &mut self.agents[self.asked]
     }
 
-    /// Replaces the demonstrator of the agent that is asked about by a new one, which remembers no episode.
-    pub(super) fn renew_demonstrator(&mut self) {
-        let demonstrator = self.game.description.demonstrator.as_ref().map(|(_, system)| system.make());
-        self.asked().demonstrator = demonstrator;
+    /// Replaces the scripted bots of the agent that is asked about by new ones, which remember no episode.
+    pub(super) fn renew_bots(&mut self) {
+        let description = self.game.description.clone();
+        let parts = self.asked();
+        parts.demonstrator = description.demonstrator.as_ref().map(|(_, system)| system.make());
+        parts.bots = description.bots.iter().map(|(name, system)| (*name, system.make())).collect();
     }
 
     /// Returns the parts of the rewards of all agents.
