@@ -106,9 +106,9 @@ pub mod lesson;
 pub mod level;
 mod loading;
 pub mod observation;
-mod own_policy;
 #[cfg(feature = "overlay")]
 pub mod overlay;
+mod own_policy;
 mod panics;
 pub mod placement;
 pub mod plugin;

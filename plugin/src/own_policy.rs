@@ -67,7 +67,9 @@ pub(crate) fn run_own_policies(
         batch.push_memory(&memory.0, width);
         let output = match batch.decide(&own.policy, None) {
             Ok(output) => output,
-            Err(error) => return faults.report(format!("{}: the policy cannot decide: {error}", episode.moment(agent))),
+            Err(error) => {
+                return faults.report(format!("{}: the policy cannot decide: {error}", episode.moment(agent)));
+            }
         };
         action.0 = match own.draw {
             ActionDraw::Sample => output.sample(0, &mut streams.action).0,
@@ -89,7 +91,8 @@ fn draw_skill(
     };
     let mut seen = Observations::empty(&own.policy.observation());
     observation.push_to(&mut seen);
-    let drawn = prior.sample(&seen, 1, *draw, &mut |_| normal(&mut streams.skill)).map_err(|error| error.to_string())?;
+    let drawn =
+        prior.sample(&seen, 1, *draw, &mut |_| normal(&mut streams.skill)).map_err(|error| error.to_string())?;
     *skill = ActiveSkill { z: drawn, ticks_left: *skill_interval };
     Ok(())
 }
@@ -115,10 +118,12 @@ mod tests {
     /// Returns the actions of two agents under the World's policy, the second with a policy of its own if there is one.
     fn actions(own: Option<Policy>) -> Vec<[Option<u32>; 2]> {
         let mut app = headless_app();
-        app.insert_resource(ActivePolicy { policy: policy(1), draw: ActionDraw::Sample })
-            .add_systems(ObserveSchedule, |mut agents: Query<&mut Observation>| {
+        app.insert_resource(ActivePolicy { policy: policy(1), draw: ActionDraw::Sample }).add_systems(
+            ObserveSchedule,
+            |mut agents: Query<&mut Observation>| {
                 agents.iter_mut().for_each(|mut seen| seen.set([0.5]));
-            });
+            },
+        );
         let agents = [0, 1].map(|index| {
             let agent = (Agent::new(index, ActionSpace::Discrete(5)), VectorSensor::new(["x"]), Control::Policy);
             app.world_mut().spawn((agent, AgentStreams::new(3, 7))).id()

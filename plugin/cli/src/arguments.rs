@@ -11,6 +11,7 @@
 pub(crate) mod experiment;
 pub(crate) mod open;
 pub(crate) mod player;
+pub(crate) mod rival;
 
 use crate::{error::CliError, output::prepare};
 use bevy_playbot::demo::file::{DemoFault, DemoFileError, DemoHeader, DemoWriter};

@@ -345,7 +345,8 @@ pub fn other_agents(world: &World, agents: &[Entity], first: u32) -> Option<Stri
         return Some(why(first + row as u32, "despawned"));
     }
     let order = world.get_resource::<AgentOrder>().filter(|order| order.entities().len() > agents.len())?;
-    let other = order.entities().iter().find(|entity| !agents.contains(entity))?;
+    let is_other = |entity: &&Entity| !agents.contains(entity) && world.get::<PlaysAlong>(**entity).is_none();
+    let other = order.entities().iter().find(is_other)?;
     world.get::<Agent>(*other).map(|agent| why(agent.index, "spawned"))
 }
 

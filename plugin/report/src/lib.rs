@@ -5,6 +5,7 @@
 //! - [`number`]: numbers for people.
 //! - [`ResultTable`]: [`ResultRow`]s of methods, rounded by their errors.
 //! - [`statistics`]: intervals by bootstrap, interquartile means, [`PairedDifference`]s, Holm's correction.
+//! - [`ratings`]: Elo ratings of players from the results of their matches.
 //! - [`text_table`]: tables on a console. A [`PlainTable`] holds any text.
 //! - [`chart`]: the data of line charts. [`to_svg`] draws [`Chart`]s, [`sparkline`] a curve in one line of text.
 //! - [`Report`]: text, tables and charts in one HTML file that loads nothing: no scripts, no fonts, no network. It
@@ -23,6 +24,7 @@ pub mod chart;
 mod document;
 pub mod escape;
 pub mod number;
+pub mod ratings;
 mod results;
 pub mod statistics;
 mod svg;

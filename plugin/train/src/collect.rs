@@ -1,11 +1,14 @@
 //! Collection of rollouts: a World that plays with the current policy.
 
+use crate::self_play::seats::{ArenaRivals, RivalSeats};
 use bevy::prelude::*;
 use bevy_playbot::{
     action::{Action, ActionSpace, ActionValue},
     agent::{Agent, AgentOrder, Control},
     demo::recorder,
-    engine::{PolicyBatch, Renewal, SharedBatch, TickSchedules, draw_skills, run_observe_schedule, tick_world},
+    engine::{
+        PlaysAlong, PolicyBatch, Renewal, SharedBatch, TickSchedules, draw_skills, run_observe_schedule, tick_world,
+    },
     episode::{Episode, EpisodeEnd, EpisodeEnded},
     fault::{Fault, Faults},
     legal::LegalActions,
@@ -20,7 +23,9 @@ use bevy_playbot::{
     vision::{ObservationConfig, VisionError},
 };
 use playbot_harness::{
+    eval::Player,
     game::Game,
+    rivals::matches::MatchEnds,
     sensors::GameSensors,
     split::LevelSplit,
     worlds::{build_observing_world, other_agents},
@@ -37,6 +42,8 @@ pub struct Collector {
     agents: Vec<Entity>,
     /// Number of the first agent.
     first: u32,
+    /// The players of the other agents, if they are chosen for each episode.
+    rivals: Option<RivalSeats>,
 }
 
 /// Rows of the rollout under construction.
@@ -66,8 +73,10 @@ pub struct Ended {
 #[reflect(Resource)]
 struct Finished(Vec<EpisodeEnded>);
 
-fn note_finished(event: On<EpisodeEnded>, mut finished: ResMut<Finished>) {
-    finished.0.push(*event);
+fn note_finished(event: On<EpisodeEnded>, others: Query<(), With<PlaysAlong>>, mut finished: ResMut<Finished>) {
+    if !others.contains(event.entity) {
+        finished.0.push(*event);
+    }
 }
 
 /// Actions of the current episode.
@@ -129,7 +138,7 @@ impl Collector {
                 ActionLog::default(),
             ));
         }
-        Ok(Self { world, agents, first })
+        Ok(Self { world, agents, first, rivals: None })
     }
 
     /// Plays `steps` ticks with this policy; `latent` is the width of the skills to keep, 0 for no skills.
@@ -189,6 +198,9 @@ impl Collector {
         world.resource_mut::<Collecting>().rollout = empty.clone();
         let mut ended = Vec::new();
         for tick in 0..steps {
+            if let Some(rivals) = &mut self.rivals {
+                rivals.before_tick(world, self.agents[0]);
+            }
             let ticked = tick_world(world);
             // What follows from a panic, or from another number of agents, says less.
             let is_panic = ticked.as_ref().is_err_and(|fault| fault.0.contains("panicked: "));
@@ -196,6 +208,9 @@ impl Collector {
                 return Err(Fault(why));
             }
             ticked?;
+            if let Some(rivals) = &mut self.rivals {
+                rivals.after_tick(world, self.agents[0]);
+            }
             let finished = std::mem::take(&mut world.resource_mut::<Finished>().0);
             let column = |agent: Entity| self.agents.iter().position(|own| *own == agent).unwrap_or_default();
             ended.extend(finished.into_iter().map(|episode| Ended { tick, agent: column(episode.entity), episode }));
@@ -206,6 +221,27 @@ impl Collector {
         bootstrap_values(world, policy, &mut rollout).map_err(|error| Fault(error.to_string()))?;
         world.resource_mut::<Faults>().take()?;
         Ok((rollout, ended))
+    }
+
+    /// Chooses the players of the other agents of its World, in which one agent learns, for each episode.
+    pub(crate) fn set_rivals(&mut self, rivals: RivalSeats) {
+        MatchEnds::note_in(&mut self.world);
+        self.rivals = Some(rivals);
+    }
+
+    /// Returns the players of the other agents, if they are chosen for each episode.
+    pub(crate) fn rivals_mut(&mut self) -> Option<&mut RivalSeats> {
+        self.rivals.as_mut()
+    }
+
+    /// Seats the rivals of a saved episode.
+    pub(crate) fn restore_rivals(
+        &mut self,
+        state: ArenaRivals,
+        find: impl Fn(usize) -> Option<Player>,
+    ) -> Result<(), RestoreError> {
+        let Some(rivals) = &mut self.rivals else { return Ok(()) };
+        rivals.restore(&mut self.world, state, find).map_err(RestoreError::Rival)
     }
 
     pub(crate) fn world(&self) -> &World {
@@ -253,7 +289,7 @@ fn bootstrap_values(world: &mut World, policy: &Policy, rollout: &mut Rollout) -
     {
         world.resource_mut::<Faults>().report(error.to_string());
     }
-    let entities = world.resource::<AgentOrder>().entities().to_vec();
+    let entities = agents_of_order(world);
     let running: Vec<_> = (0..entities.len())
         .filter(|&row| world.get::<Episode>(entities[row]).is_some_and(Episode::is_running))
         .collect();
@@ -287,6 +323,12 @@ fn bootstrap_values(world: &mut World, policy: &Policy, rollout: &mut Rollout) -
     Ok(())
 }
 
+/// Returns the agents whose ticks are rows of the rollout, in order: all but those that play along.
+fn agents_of_order(world: &World) -> Vec<Entity> {
+    let order = world.resource::<AgentOrder>().entities().iter();
+    order.copied().filter(|&agent| world.get::<PlaysAlong>(agent).is_none()).collect()
+}
+
 /// Appends one row per agent to the rollout.
 fn collect_tick(world: &mut World) {
     let Some(policy) = world.get_resource::<ActivePolicy>().map(|active| active.policy.clone()) else {
@@ -295,7 +337,7 @@ fn collect_tick(world: &mut World) {
     };
     // The rollout is put back even if the tick fails.
     let pushed = world.try_resource_scope(|world, mut collecting: Mut<Collecting>| {
-        let entities = world.resource::<AgentOrder>().entities().to_vec();
+        let entities = agents_of_order(world);
         let kind = collecting.kind;
         let cut = cut_episodes(world, &entities, &policy, &kind)?;
         let mut final_values = vec![0.0; entities.len()];
@@ -545,6 +587,9 @@ pub enum RestoreError {
         /// Arenas of the experiment.
         wanted: usize,
     },
+    /// The checkpoint lacks the policy of a rival.
+    #[error("the checkpoint has no policy for rival {0}, which plays in one of its episodes")]
+    Rival(usize),
     /// Unreadable generator state, or an action outside the game's space.
     #[error(transparent)]
     Stream(#[from] playbot_learner::LearnError),

@@ -9,6 +9,7 @@ use bevy_playbot::{
     vision::{ObservationConfig, UnknownObservation, VisionError},
 };
 use playbot_harness::{
+    rivals::matches::MatchError,
     sealed_file::{SealedFileError, damaged},
     split::LevelSplit,
 };
@@ -116,6 +117,9 @@ pub enum TrainError {
     /// A checkpoint could not be restored.
     #[error(transparent)]
     Restore(#[from] RestoreError),
+    /// Matches with rivals cannot be played.
+    #[error("the rating of rivals failed: {0}")]
+    Rivals(Box<MatchError>),
 }
 
 impl HasExitCode for TrainError {
@@ -123,6 +127,7 @@ impl HasExitCode for TrainError {
         match self {
             Self::Fault(_) | Self::Restore(RestoreError::Fault(_)) => 2,
             Self::Learn(error) => error.exit_code(),
+            Self::Rivals(error) => error.exit_code(),
             _ => 3,
         }
     }

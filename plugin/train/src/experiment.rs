@@ -6,6 +6,7 @@
 //! - `keys`: the setting of each key, and messages about wrong ones.
 //! - `checks`: checks of an experiment, alone, against its game and against the machine's memory.
 //! - `lessons`: settings of the levels that a training plays: earlier lessons and their order.
+//! - `self_play`: settings of a training against rivals.
 //! - `error`: errors of experiment files and of `--set`, with their positions.
 //! - `page`: the reference page of all settings.
 
@@ -15,6 +16,7 @@ pub mod file;
 pub(crate) mod keys;
 mod lessons;
 pub mod page;
+mod self_play;
 
 use bevy_playbot::{
     unknown_name::UnknownName,
@@ -34,6 +36,7 @@ use std::{collections::BTreeSet, fmt, path::PathBuf, str::FromStr};
 pub use crate::experiment::{
     checks::ExperimentError,
     lessons::{CurriculumConfig, CurriculumLesson, LevelOrder, LevelsConfig, MOST_SCORED},
+    self_play::SelfPlayConfig,
 };
 pub use bevy_playbot::vision::ObservationKind;
 pub use playbot_assets::{ExperimentFile, PRESETS};
@@ -64,6 +67,9 @@ settings! {
         serde(default, skip_serializing_if = "is_off");
     /// The choice among the levels.
     levels: LevelsConfig, keys of LevelsConfig,
+        serde(default, skip_serializing_if = "is_off");
+    /// A training against rivals, in a game whose agents share an arena.
+    self_play: SelfPlayConfig, keys of SelfPlayConfig,
         serde(default, skip_serializing_if = "is_off");
     /// Numbers of the game that each level multiplies by factors of its own, in training and evaluation, by their paths.
     /// A path is `Resource.field` or `Marker.Component.field`; the types derive `Reflect`.

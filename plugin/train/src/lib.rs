@@ -12,6 +12,7 @@
 //! - [`trainer`]: the training loop, one update at a time ([`Trainer`]); [`collect`]: the Worlds that play for it.
 //! - [`train_run`]: a whole run ([`train_run::Training`]), with its folder ([`run_dir`]), checkpoints
 //!   ([`checkpoint`]), metrics ([`metrics_log`], [`tensorboard`]) and observer ([`run_observer`]).
+//! - [`self_play`]: a training against rivals, and their [`ladder`](self_play::ladder).
 //! - [`begin_from`]: the start of a run from another one, and its ancestry ([`ancestor`]).
 //! - [`imitate`]: imitation of recordings, or of a demonstrator that is asked (DAgger).
 //! - [`policy_export`]: the one file that a game ships with.
@@ -39,6 +40,7 @@ pub mod recordings;
 pub mod run_dir;
 pub mod run_observer;
 pub mod runs;
+pub mod self_play;
 pub mod study;
 pub mod study_runner;
 pub mod tensorboard;

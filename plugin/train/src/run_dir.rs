@@ -25,6 +25,7 @@ use crate::{
     },
     levels::LevelState,
     metrics_log::{MetricsLog, UpdateReport},
+    self_play::{SelfPlayState, read_snapshots},
     trainer,
     trainer::{Progress, TrainedLearner, Trainer},
 };
@@ -36,7 +37,7 @@ use playbot_harness::{
         write_sealed,
     },
 };
-use playbot_learner::{DeviceKind, SeenLevels, disk, disk::DiskFile, seal_text};
+use playbot_learner::{DeviceKind, Policy, SeenLevels, disk, disk::DiskFile, seal_text};
 use serde::{Deserialize, Serialize};
 use std::{
     ffi::OsString,
@@ -90,7 +91,13 @@ struct TrainState {
     /// Missing without lessons and an order of levels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     levels: Option<LevelState>,
+    /// Missing without rivals.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    self_play: Option<SelfPlayState>,
 }
+
+/// A checkpoint that was read: its learner, its state, and the policies of its rivals.
+type ReadCheckpoint = (TrainedLearner, TrainState, Vec<(usize, Policy)>);
 
 /// An open folder of a run.
 pub struct RunDir {
@@ -231,8 +238,14 @@ impl RunDir {
         checkpoint::write(&self.path, trainer.progress.summary(), keep, |fresh| {
             trainer.learner.save(&fresh.learner_file())?;
             let (progress, levels) = (trainer.progress.clone(), trainer.level_state());
-            let state = TrainState { progress, arenas: trainer.save_arenas(), levels };
-            Ok(write_sealed(&fresh.arenas_file(), &state)?)
+            let (arenas, self_play) = (trainer.save_arenas(), trainer.self_play_state());
+            if let Some(rivals) = trainer.self_play() {
+                let (experiment, skills) = (trainer.experiment(), trainer.skill_source());
+                let (observation, algorithm) = (experiment.observation_config(), experiment.algorithm.name());
+                rivals.save(&fresh.path, self_play.as_ref(), &observation, skills.as_ref(), algorithm)?;
+                rivals.ladder().write(&self.path)?;
+            }
+            Ok(write_sealed(&fresh.arenas_file(), &TrainState { progress, arenas, levels, self_play })?)
         })
     }
 
@@ -250,10 +263,13 @@ impl RunDir {
         threads: usize,
     ) -> Result<Trainer, RunError> {
         trainer::check(game, experiment)?;
-        let (mut learner, state) = self.last_readable(experiment.algorithm, device)?;
+        let (mut learner, state, rivals) = self.last_readable(experiment, device)?;
         let continued_schedule = learner.set_length(experiment);
         let mut trainer = Trainer::with_learner(game, experiment, learner, threads, state.levels)?;
         trainer.report_panics_to(&self.path);
+        if let Some(self_play) = state.self_play {
+            trainer.restore_self_play(self_play, rivals).map_err(TrainError::from)?;
+        }
         trainer.restore_arenas(&state.arenas).map_err(TrainError::from)?;
         (trainer.progress, trainer.continued_schedule) = (state.progress, continued_schedule);
         trainer.seen = read_sealed::<RunInfo>(&self.path.join("run.json"))?.0.seen;
@@ -262,14 +278,10 @@ impl RunDir {
         Ok(trainer)
     }
 
-    fn last_readable(
-        &self,
-        algorithm: Algorithm,
-        device: DeviceKind,
-    ) -> Result<(TrainedLearner, TrainState), RunError> {
+    fn last_readable(&self, experiment: &Experiment, device: DeviceKind) -> Result<ReadCheckpoint, RunError> {
         let mut bad = Vec::new();
         for checkpoint in checkpoint::list(&self.path)?.iter().rev() {
-            match read_checkpoint(checkpoint, algorithm, device) {
+            match read_checkpoint(checkpoint, experiment, device) {
                 Ok(read) => {
                     if let Some(words) = passed_over(&bad, checkpoint.summary.step) {
                         tracing::warn!("{words}");
@@ -286,11 +298,16 @@ impl RunDir {
 
 fn read_checkpoint(
     checkpoint: &Checkpoint,
-    algorithm: Algorithm,
+    experiment: &Experiment,
     device: DeviceKind,
-) -> Result<(TrainedLearner, TrainState), RunError> {
-    let learner = TrainedLearner::load(algorithm, &checkpoint.learner_file(), device)?;
-    Ok((learner, read_sealed(&checkpoint.arenas_file())?.0))
+) -> Result<ReadCheckpoint, RunError> {
+    let learner = TrainedLearner::load(experiment.algorithm, &checkpoint.learner_file(), device)?;
+    let state: TrainState = read_sealed(&checkpoint.arenas_file())?.0;
+    let rivals = match &state.self_play {
+        Some(rivals) => read_snapshots(&checkpoint.path, &experiment.self_play, rivals, device)?,
+        None => Vec::new(),
+    };
+    Ok((learner, state, rivals))
 }
 
 /// Adds the remedy to the error of a damaged file.

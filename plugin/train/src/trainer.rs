@@ -8,6 +8,7 @@ use crate::{
     experiment::{Algorithm, Experiment, ExperimentError, LearnerKind},
     levels::{EndedEpisode, LevelPlan, LevelState},
     metrics_log::{RECENT, Timing, UpdateReport},
+    self_play::{SelfPlay, SelfPlayState, ladder::Ladder, seats::ArenaRivals},
 };
 use bevy::prelude::World;
 use bevy_playbot::{
@@ -38,7 +39,7 @@ use std::{
     collections::VecDeque,
     ops::{Deref, DerefMut, RangeInclusive},
     path::Path,
-    sync::{Mutex, PoisonError},
+    sync::{Arc, Mutex, PoisonError},
     time::{Duration, Instant},
 };
 
@@ -67,6 +68,8 @@ pub struct Trainer {
     obs_kind: ObsKind,
     /// Memory of the last rollout's observations, reused for the next.
     obs: Observations,
+    /// The rivals, in a training against some.
+    self_play: Option<SelfPlay>,
 }
 
 impl Trainer {
@@ -122,6 +125,9 @@ impl Trainer {
         levels: Option<LevelState>,
     ) -> Result<Self, TrainError> {
         let prior = learner.skills().as_ref().map(SkillPrior::from);
+        let self_play = SelfPlay::new(game, experiment, prior.clone(), threads)?;
+        let opposed = self_play.as_ref().map(|it| it.game_of(0).clone());
+        let game: &dyn Game = opposed.as_deref().map_or(game, |it| it);
         let of_experiment = experiment.arrangement(game);
         let arrangement = match experiment.observation {
             // A graphics card draws for few Worlds sooner.
@@ -139,8 +145,13 @@ impl Trainer {
                 for (agents, levels) in plan.parts_by_mode(first as usize..(first + share) as usize, lesson) {
                     let (first, count) = (agents.start as u32, agents.len() as u32);
                     let prior = prior.clone();
+                    let opposed = self_play.as_ref().map(|it| it.game_of(first).clone());
+                    let game: &dyn Game = opposed.as_deref().map_or(game, |it| it);
                     let mut collector = Collector::new(game, levels, &observation_config, seed, first, count, prior)?;
                     check_spaces(game, levels, &collector)?;
+                    if let Some(rivals) = &self_play {
+                        collector.set_rivals(rivals.seats_of(first));
+                    }
                     experiment.randomise.install(collector.world_mut());
                     collectors.push(collector);
                 }
@@ -167,6 +178,7 @@ impl Trainer {
             raw,
             obs_kind,
             obs,
+            self_play,
         };
         trainer.renew_queues();
         Ok(trainer)
@@ -186,6 +198,7 @@ impl Trainer {
         let start = Instant::now();
         let (policy, latent) = (self.learner.policy(), self.learner.rollout_latent());
         self.renew_skills();
+        self.renew_rivals(&policy);
         let steps = self.experiment.rollout_steps();
         let before = self.learner.times();
         let Collected { rollout, finished, played, alone } = self.collect(&policy, latent, steps)?;
@@ -201,7 +214,9 @@ impl Trainer {
         let finished: Vec<EpisodeEnded> = finished.into_iter().map(|(_, ended)| ended.episode).collect();
         self.progress.note(&finished);
         self.progress.updates += 1;
+        let before_update = self.progress.steps;
         self.progress.steps += self.experiment.steps_per_update();
+        self.rate_rivals(before_update)?;
         let times = self.learner.times().since(before);
         let whole = start.elapsed();
         // All but the loops of networks runs on one thread, once the Worlds have played.
@@ -217,9 +232,66 @@ impl Trainer {
         };
         let mut report = self.progress.report(learner, initial_kl, timing);
         report.levels = self.plan.scalars();
+        report.levels.extend(self.self_play.iter().flat_map(SelfPlay::scalars));
         report.clipped_share =
             report.clipped_share.filter(|_| matches!(policy.action_space(), ActionSpace::Continuous(_)));
         Ok(report)
+    }
+
+    /// Lets the next episodes have the present rivals, `policy` being the first of them.
+    fn renew_rivals(&mut self, policy: &Policy) {
+        let Some(self_play) = &mut self.self_play else { return };
+        self_play.begin(policy);
+        let Some(pool) = self_play.pool().map(Arc::new) else { return };
+        self.collectors.iter_mut().filter_map(Collector::rivals_mut).for_each(|rivals| rivals.set_pool(&pool));
+    }
+
+    /// Notes the results of a rollout against rivals, and adds a snapshot of the policy to them if one is due.
+    fn rate_rivals(&mut self, before: u64) -> Result<(), TrainError> {
+        let (step, is_done) = (self.progress.steps, self.is_done());
+        let Some(self_play) = &mut self.self_play else { return Ok(()) };
+        let rivals = self.collectors.iter_mut().filter_map(Collector::rivals_mut);
+        let (playing, outcomes): (Vec<_>, Vec<_>) = rivals.map(|it| (it.state(), it.take_outcomes())).unzip();
+        self_play.note(outcomes.into_iter().flatten());
+        self_play.after_update([before, step], is_done, &self.learner.policy(), &playing)
+    }
+
+    /// Returns what a checkpoint keeps of a training against rivals.
+    pub(crate) fn self_play_state(&mut self) -> Option<SelfPlayState> {
+        let arenas = self.collectors.iter_mut().filter_map(Collector::rivals_mut).map(|it| it.state()).collect();
+        self.self_play.as_ref().map(|it| it.state(arenas))
+    }
+
+    /// Returns the training against rivals, if it is one.
+    pub(crate) fn self_play(&self) -> Option<&SelfPlay> {
+        self.self_play.as_ref()
+    }
+
+    /// Returns the rivals by their ratings; `None` in a training without rivals.
+    pub fn ladder(&self) -> Option<Ladder> {
+        self.self_play.as_ref().map(SelfPlay::ladder)
+    }
+
+    /// Goes on with the rivals of a checkpoint, in a fresh trainer, before its arenas are restored.
+    ///
+    /// # Errors
+    ///
+    /// [`RestoreError`] if the checkpoint lacks a rival.
+    pub(crate) fn restore_self_play(
+        &mut self,
+        state: SelfPlayState,
+        snapshots: Vec<(usize, Policy)>,
+    ) -> Result<(), RestoreError> {
+        let Some(self_play) = &mut self.self_play else { return Ok(()) };
+        let arenas = self_play.restore(state, snapshots);
+        let wanted = self.collectors.len();
+        if arenas.len() != wanted {
+            return Err(RestoreError::Count { saved: arenas.len(), wanted });
+        }
+        for (collector, state) in self.collectors.iter_mut().zip(arenas) {
+            collector.restore_rivals(state, |number| self_play.find(number))?;
+        }
+        Ok(())
     }
 
     /// Decides which levels are played next, from the episodes of a rollout, each with its agent.
@@ -247,7 +319,11 @@ impl Trainer {
     fn change_worlds(&mut self, lesson: usize) {
         let Some((_, collectors)) = self.later.pop_front_if(|(first, _)| *first == lesson) else { return };
         let streams: Vec<_> = self.collectors.iter().flat_map(Collector::streams).collect();
+        let rivals = self.collectors.iter_mut().filter_map(Collector::rivals_mut).map(|it| it.state());
+        let rivals: Vec<ArenaRivals> = rivals.collect();
         self.collectors = collectors;
+        let seats = self.collectors.iter_mut().filter_map(Collector::rivals_mut);
+        seats.zip(rivals).for_each(|(seats, state)| seats.set_state(state));
         let mut rest = streams.as_slice();
         for collector in &mut self.collectors {
             let (own, others) = rest.split_at(collector.agents().len().min(rest.len()));

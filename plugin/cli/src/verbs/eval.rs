@@ -1,16 +1,20 @@
 //! `playbot eval`.
 
+mod matches;
+
 use crate::{
     arguments::{
         Compute, check_start, default_held_out,
         experiment::{ExperimentArgs, include_seen, option},
         first_levels, name_in_list, open, player,
         player::{LoadedPlayer, MeasuredLevels, action_draw, check_run_of, check_skills},
+        rival::RivalArgs,
     },
     error::{CliError, Outcome},
     output::print_line,
     pictures::plot::Footprints,
     progress::{interrupt, interrupt::NothingToSave},
+    verbs::eval::matches::Opposition,
 };
 use bevy_playbot::vision::{ObservationConfig, ObservationKind};
 use playbot_harness::{
@@ -44,6 +48,7 @@ use std::{
   playbot eval --run runs/first --bot random --levels MODE:64..66 --plot where.png
   playbot eval --run runs/first --bot BOT --levels MODE:64..127 --levels MODE:500..599
   playbot eval --run runs/first --include-seen
+  playbot eval --run runs/first --rival BOT --levels MODE:1000..1255
   playbot eval --policy bot.policy --at-least success=0.9 --at-least return=8")]
 pub struct Args {
     /// Folder of a run (repeatable).
@@ -82,6 +87,8 @@ pub struct Args {
     /// Take the most probable action instead of drawing one.
     #[arg(long)]
     greedy: bool,
+    #[command(flatten)]
+    against: RivalArgs,
     #[command(flatten)]
     from: ExperimentArgs,
     /// Random seed of the players' draws, instead of the experiment's.
@@ -130,6 +137,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     check_start(game, &splits[0].mode, splits[0].first)?;
     let (players, known) = players(game, &experiment, &splits, &args, games)?;
     let known = known_levels(game, &splits, known, &args, experiment.eval.include_seen)?;
+    let opposition = opposition(game, &experiment, &splits, &players, &args)?;
     let kept = if args.json { KEPT_LINES } else { KEPT_NOTHING };
     interrupt::leave(kept.to_owned());
     let measuring = NothingToSave::listen();
@@ -139,6 +147,10 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         for LoadedPlayer { name, player, observation_config, .. } in &players {
             let observation_config = *observation_config;
             let plan = EvalPlan { observation_config, left_out: known.left_out.clone(), ..plan_of(split) };
+            if let Some(opposition) = &opposition {
+                shortfalls.extend(opposition.measure(game, (name, player), &plan, &args.at_least, args.json)?);
+                continue;
+            }
             let mut measured = match &mut footprints {
                 Some(footprints) => {
                     let (measured, trails) = player::follow(game, name, player, &plan)?;
@@ -156,7 +168,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         }
     }
     drop(measuring);
-    if !args.json {
+    if !args.json && opposition.is_none() {
         print_line(to_text_table(&rows))?;
     }
     // Last, so that a measurement is not lost because it cannot be drawn.
@@ -165,6 +177,31 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     }
     shortfalls.iter().for_each(|shortfall| report!("{shortfall}"));
     Ok(if shortfalls.is_empty() { Outcome::Pass } else { Outcome::Findings })
+}
+
+/// Returns the rival of all players, if one is named.
+fn opposition(
+    game: &dyn Game,
+    experiment: &Experiment,
+    splits: &[LevelSplit],
+    players: &[LoadedPlayer],
+    args: &Args,
+) -> Result<Option<Opposition>, CliError> {
+    let Some(first) = splits.first().filter(|_| args.against.rival.is_some()) else { return Ok(None) };
+    if args.plot.is_some() {
+        return Err(CliError::Usage("--plot draws no matches: leave it out, or --rival".to_owned()));
+    }
+    if let Some(player) = players.iter().find(|player| player.observation_config.is_image()) {
+        let name = &player.name;
+        return Err(CliError::Usage(format!(
+            "{name} sees pictures, and matches are played by vectors: leave it out, or --rival"
+        )));
+    }
+    let is_policy = args.against.rival.as_deref().is_some_and(|name| Player::bot(game, name).is_err());
+    let draw = action_draw(is_policy && (args.greedy || experiment.eval.greedy), is_policy)?;
+    let rival = args.against.load(game, &first.mode, draw, args.compute.device())?;
+    let seat = args.against.seat(game)?;
+    Ok(rival.map(|rival| Opposition { rival, seat }))
 }
 
 /// Decides whether known levels are measured: not if they are held out, and with --new-layouts in no range. All players

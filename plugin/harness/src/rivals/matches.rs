@@ -26,7 +26,7 @@ use thiserror::Error;
 /// The result of a match for one side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Outcome {
+pub enum MatchOutcome {
     /// The player's side won.
     Win,
     /// Neither side won.
@@ -35,7 +35,7 @@ pub enum Outcome {
     Loss,
 }
 
-impl Outcome {
+impl MatchOutcome {
     /// Returns the points of a match: 1 for a win, half a point for a draw.
     pub fn points(self) -> f64 {
         match self {
@@ -88,7 +88,7 @@ pub struct Match {
     /// The seat of the player.
     pub seat: usize,
     /// Its result for the player.
-    pub outcome: Outcome,
+    pub outcome: MatchOutcome,
     /// The player's episode.
     pub episode: EpisodeResult,
 }
@@ -197,14 +197,14 @@ impl MatchEnds {
     }
 
     /// Returns the result of the match that ended in the last tick for this agent, if one did, and empties the list.
-    pub fn take(world: &mut World, opposed: &Opposed, agent: Entity) -> Option<(Outcome, EpisodeResult)> {
+    pub fn take(world: &mut World, opposed: &Opposed, agent: Entity) -> Option<(MatchOutcome, EpisodeResult)> {
         let mut ends = world.get_resource_mut::<Self>().filter(|ends| !ends.0.is_empty())?;
         let ended = std::mem::take(&mut ends.0);
         let own = ended.iter().find(|(entity, _)| *entity == agent).map(|(_, result)| *result)?;
         let others = opposed.others(world);
         let is_rival = |entity: Entity| others.iter().any(|(other, is_mate)| *other == entity && !is_mate);
         let rivals = ended.iter().filter(|(entity, _)| is_rival(*entity)).map(|(_, result)| result);
-        Some((Outcome::of(&own, rivals), own))
+        Some((MatchOutcome::of(&own, rivals), own))
     }
 }
 
@@ -220,27 +220,27 @@ mod tests {
     fn a_match_is_won_drawn_or_lost_by_the_ends_of_both_sides() {
         let (won, lost, truncated) = (EpisodeEnd::WON, EpisodeEnd::LOST, EpisodeEnd::Truncated);
         for (own, rivals, expected) in [
-            (won, vec![lost], Outcome::Win),
-            (won, vec![truncated], Outcome::Win),
-            (lost, vec![won], Outcome::Loss),
-            (truncated, vec![won], Outcome::Loss),
+            (won, vec![lost], MatchOutcome::Win),
+            (won, vec![truncated], MatchOutcome::Win),
+            (lost, vec![won], MatchOutcome::Loss),
+            (truncated, vec![won], MatchOutcome::Loss),
             // A game that has no end of its own for the rival.
-            (lost, vec![truncated], Outcome::Loss),
-            (truncated, vec![truncated], Outcome::Draw),
-            (lost, vec![lost], Outcome::Draw),
-            (won, vec![won], Outcome::Draw),
+            (lost, vec![truncated], MatchOutcome::Loss),
+            (truncated, vec![truncated], MatchOutcome::Draw),
+            (lost, vec![lost], MatchOutcome::Draw),
+            (won, vec![won], MatchOutcome::Draw),
             // One of two rivals is out of the game, and the other one has won.
-            (lost, vec![lost, won], Outcome::Loss),
+            (lost, vec![lost, won], MatchOutcome::Loss),
         ] {
             let rivals: Vec<EpisodeResult> = rivals.into_iter().map(result).collect();
-            assert_eq!(Outcome::of(&result(own), &rivals), expected, "{own:?} against {rivals:?}");
+            assert_eq!(MatchOutcome::of(&result(own), &rivals), expected, "{own:?} against {rivals:?}");
         }
     }
 
     #[test]
     fn a_goal_that_was_reached_before_time_was_up_is_a_win() {
         let reached = EpisodeResult { success: true, ..result(EpisodeEnd::Truncated) };
-        assert_eq!(Outcome::of(&reached, &[result(EpisodeEnd::Truncated)]), Outcome::Win);
-        assert_eq!(Outcome::of(&result(EpisodeEnd::Truncated), &[reached]), Outcome::Loss);
+        assert_eq!(MatchOutcome::of(&reached, &[result(EpisodeEnd::Truncated)]), MatchOutcome::Win);
+        assert_eq!(MatchOutcome::of(&result(EpisodeEnd::Truncated), &[reached]), MatchOutcome::Loss);
     }
 }

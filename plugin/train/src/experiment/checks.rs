@@ -45,7 +45,7 @@ impl Experiment {
             self.checkpoints.check_ranges(),
             self.study.check_ranges(),
         ];
-        let of_levels = [self.curriculum.check_ranges(), self.levels.check_ranges()];
+        let of_levels = [self.curriculum.check_ranges(), self.levels.check_ranges(), self.self_play.check_ranges()];
         own.into_iter().chain(of_levels).collect::<Result<(), _>>().map_err(out_of_range)?;
         let of_image =
             |error| ExperimentError::Settings { key: Some("image".to_owned()), words: format!("`image`: {error}") };
@@ -58,6 +58,7 @@ impl Experiment {
         self.rlpd.validate().map_err(settings)?;
         self.check_rollout()?;
         self.check_lessons()?;
+        self.check_self_play()?;
         if self.algorithm.learns_from_demos() {
             self.recordings()?;
         }
@@ -181,6 +182,7 @@ impl Experiment {
     pub fn check_game(&self, game: &dyn Game) -> Result<(), ExperimentError> {
         self.check_levels(game)?;
         self.check_sharing(game)?;
+        self.check_rivals_of(game)?;
         self.check_agent(game)
     }
 
@@ -397,8 +399,12 @@ impl Experiment {
         self.check_threads(self.arrangement(game), room.threads)
     }
 
-    /// Returns the Worlds of a training: one for each arena if levels draw values, which are those of a World.
+    /// Returns the Worlds of a training: one for each arena if levels draw values, which are those of a World, and one for
+    /// each learning agent that has rivals.
     pub(crate) fn arrangement(&self, game: &dyn Game) -> Arrangement {
+        if self.self_play.every.is_some() {
+            return Arrangement { worlds: self.arenas, arenas: 1 };
+        }
         let shared = Arrangement::of_agents(game, self.arenas, self.worlds);
         if self.randomise.is_empty() { shared } else { shared.apart(game) }
     }

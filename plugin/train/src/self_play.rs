@@ -1,0 +1,328 @@
+//! Training against rivals: snapshots of the policy and scripted bots, drawn for each episode, and their ratings.
+//!
+//! One agent of each arena learns, on a seat that the arena keeps: arena n has seat n modulo the number of seats, so each
+//! seat learns equally often. The others play along by the rivals of a [`RivalPool`], as
+//! [`rivals`](playbot_harness::rivals) describes. The rival of an episode is drawn from a stream of the run's seed, the
+//! arena and the number of its episode, so the number of threads changes nothing. All that is decided later depends on
+//! is in [`SelfPlayState`] and in the policies of [`snapshots`](SelfPlay::kept), which a checkpoint keeps.
+//!
+//! The folder:
+//!
+//! - `ladder`: the table of all rivals by their ratings, and its file in a run.
+//! - `seats`: the rivals of one arena, episode by episode.
+
+pub mod ladder;
+pub(crate) mod seats;
+
+use crate::{
+    error::TrainError,
+    experiment::{Experiment, SelfPlayConfig},
+    metrics_log::RECENT,
+    policy_export::{Provenance, policy_file},
+    self_play::{
+        ladder::{Ladder, ladder_of},
+        seats::{ArenaRivals, RivalPool, RivalSeats},
+    },
+};
+use bevy_playbot::{policy::ActionDraw, skill_prior::SkillPrior, vision::ObservationConfig};
+use playbot_harness::{
+    eval::Player,
+    game::Game,
+    rivals::{
+        Opposed, RivalError,
+        matches::{MatchOutcome, MatchPlan, play_matches},
+        scripted_rival,
+    },
+};
+use playbot_learner::{DeviceKind, FileError, Observations, Policy, PolicyFile, SkillSource};
+use playbot_report::ratings::{Encounter, Rating};
+use serde::{Deserialize, Serialize};
+use std::{
+    collections::VecDeque,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+/// Tag of the share of wins among the last 100 training episodes, against all rivals.
+pub const WIN_RATE: &str = "self_play/win_rate";
+
+/// Tag of the share of draws among them.
+pub const DRAW_RATE: &str = "self_play/draw_rate";
+
+/// Tag of the newest snapshot's rating.
+pub const ELO: &str = "self_play/elo";
+
+/// What a training against rivals is decided from, besides the policies of its snapshots.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct SelfPlayState {
+    /// Environment steps at which each snapshot was taken.
+    steps: Vec<u64>,
+    /// Results of rating matches. Numbers are those of the ladder: bots, then snapshots.
+    encounters: Vec<Encounter>,
+    /// Results of the last training episodes, the oldest first.
+    recent: VecDeque<MatchOutcome>,
+    /// The rivals of each arena.
+    arenas: Vec<ArenaRivals>,
+}
+
+/// A training against rivals.
+pub(crate) struct SelfPlay {
+    config: SelfPlayConfig,
+    /// The game with its first agent on each seat.
+    seats: Vec<Arc<Opposed>>,
+    /// The matches by which a snapshot is rated against another player.
+    rating: MatchPlan,
+    seed: u64,
+    bots: Vec<(String, Player)>,
+    /// Snapshots that play, each with its number among all, the oldest first.
+    snapshots: Vec<(usize, Policy)>,
+    prior: Option<SkillPrior>,
+    state: SelfPlayState,
+}
+
+impl SelfPlay {
+    /// Prepares a training against rivals, without a snapshot yet; `None` for one without rivals. The experiment was
+    /// checked with the game.
+    pub(crate) fn new(
+        game: &dyn Game,
+        experiment: &Experiment,
+        prior: Option<SkillPrior>,
+        threads: usize,
+    ) -> Result<Option<Self>, TrainError> {
+        let config = experiment.self_play.clone();
+        if config.every.is_none() {
+            return Ok(None);
+        }
+        experiment.check_rivals_of(game)?;
+        let count = game.tools().host.seats().len();
+        let seats = (0..count).map(|seat| Ok(Arc::new(Opposed::new(game, seat)?))).collect::<Result<Vec<_>, _>>();
+        let bots = config.bots().filter_map(|name| {
+            let player = scripted_rival(game, name).ok()?;
+            Some((name.clone(), player))
+        });
+        let most = usize::try_from(config.matches).unwrap_or(usize::MAX);
+        let rating = MatchPlan {
+            mode: experiment.test.mode.clone(),
+            levels: experiment.test.levels().take(most).collect(),
+            seats: Vec::new(),
+            seed: experiment.seed,
+            threads,
+            randomise: experiment.randomise.clone(),
+        };
+        let bots = bots.collect();
+        let (snapshots, state) = (Vec::new(), SelfPlayState::default());
+        let seats = seats.map_err(|error: RivalError| TrainError::Rivals(Box::new(error.into())))?;
+        Ok(Some(Self { config, seats, rating, seed: experiment.seed, bots, snapshots, prior, state }))
+    }
+
+    /// Returns the game as the agent of this number meets it.
+    pub(crate) fn game_of(&self, agent: u32) -> &Arc<Opposed> {
+        &self.seats[agent as usize % self.seats.len()]
+    }
+
+    /// Returns the rivals of the arena of this agent, before its first episode.
+    pub(crate) fn seats_of(&self, agent: u32) -> RivalSeats {
+        RivalSeats::new(self.game_of(agent).clone(), u64::from(agent))
+    }
+
+    /// Returns the number of a snapshot on the ladder.
+    fn number(&self, snapshot: usize) -> usize {
+        self.bots.len() + snapshot
+    }
+
+    fn player(&self, policy: &Policy) -> Player {
+        Player::Policy { policy: policy.clone(), prior: self.prior.clone(), draw: ActionDraw::Sample }
+    }
+
+    /// Returns the snapshots that are drawn: the newest of them.
+    fn drawn(&self) -> &[(usize, Policy)] {
+        &self.snapshots[self.snapshots.len().saturating_sub(pool_of(&self.config))..]
+    }
+
+    /// Returns the rivals of the next episodes; `None` before the first snapshot.
+    pub(crate) fn pool(&self) -> Option<RivalPool> {
+        let (newest, policy) = self.snapshots.last()?;
+        let newest = (self.number(*newest), self.player(policy));
+        let bots = self.bots.iter().take(self.config.rivals.len()).enumerate();
+        let bots = bots.map(|(number, (_, player))| (number, player.clone()));
+        let snapshots = self.drawn().iter().map(|(it, policy)| (self.number(*it), self.player(policy)));
+        let has_snapshots = !self.drawn().is_empty();
+        let latest = if has_snapshots { self.config.latest } else { 0.0 };
+        Some(RivalPool { seed: self.seed, latest, newest, all: bots.chain(snapshots).collect() })
+    }
+
+    /// Returns the player of this number on the ladder, if it is a bot or a snapshot that is kept.
+    pub(crate) fn find(&self, number: usize) -> Option<Player> {
+        if let Some((_, player)) = self.bots.get(number) {
+            return Some(player.clone());
+        }
+        let kept = self.snapshots.iter().find(|(snapshot, _)| self.number(*snapshot) == number);
+        kept.map(|(_, policy)| self.player(policy))
+    }
+
+    /// Takes the first snapshot, if there is none yet.
+    pub(crate) fn begin(&mut self, policy: &Policy) {
+        if self.state.steps.is_empty() {
+            self.add(0, policy);
+        }
+    }
+
+    fn add(&mut self, step: u64, policy: &Policy) {
+        self.snapshots.push((self.state.steps.len(), policy.clone()));
+        self.state.steps.push(step);
+    }
+
+    /// Notes the results of the training episodes of a rollout, in order.
+    pub(crate) fn note(&mut self, outcomes: impl IntoIterator<Item = MatchOutcome>) {
+        self.state.recent.extend(outcomes);
+        let surplus = self.state.recent.len().saturating_sub(RECENT);
+        self.state.recent.drain(..surplus);
+    }
+
+    /// Takes a snapshot of the policy if one is due after so many steps, `playing` being the numbers of those that play in
+    /// episodes that still run, and rates it.
+    ///
+    /// # Errors
+    ///
+    /// [`TrainError`]: the game broke its contract in a match.
+    pub(crate) fn after_update(
+        &mut self,
+        [before, step]: [u64; 2],
+        is_done: bool,
+        policy: &Policy,
+        playing: &[ArenaRivals],
+    ) -> Result<(), TrainError> {
+        let every = self.config.every.unwrap_or(u64::MAX);
+        if before / every == step / every && !is_done {
+            return Ok(());
+        }
+        self.add(step, policy);
+        self.rate_newest()?;
+        let all = self.state.steps.len();
+        let config = &self.config;
+        self.snapshots.retain(|(snapshot, _)| is_kept(*snapshot, all, config, playing));
+        Ok(())
+    }
+
+    /// Plays the newest snapshot against all bots, and against those before it that are rivals.
+    fn rate_newest(&mut self) -> Result<(), TrainError> {
+        let Some((newest, policy)) = self.snapshots.last() else { return Ok(()) };
+        let (one, player) = (self.number(*newest), self.player(policy));
+        if self.rating.levels.is_empty() {
+            return Ok(());
+        }
+        let first = newest.saturating_sub(pool_of(&self.config).max(1));
+        let earlier = self.snapshots.iter().filter(|(snapshot, _)| (first..*newest).contains(snapshot));
+        let earlier = earlier.map(|(snapshot, policy)| (self.number(*snapshot), self.player(policy)));
+        let bots = self.bots.iter().enumerate().map(|(number, (_, player))| (number, player.clone()));
+        let mut met = Vec::new();
+        for (other, rival) in bots.chain(earlier) {
+            let played = play_matches(&*self.seats[0], &player, &rival, &self.rating, |_| {});
+            let played = played.map_err(|error| TrainError::Rivals(Box::new(error)))?;
+            let count = |outcome| played.iter().filter(|it| it.outcome == outcome).count() as u64;
+            let [wins, draws, losses] = [MatchOutcome::Win, MatchOutcome::Draw, MatchOutcome::Loss].map(count);
+            met.push(Encounter { one, other, wins, draws, losses });
+        }
+        self.state.encounters.extend(met);
+        Ok(())
+    }
+
+    /// Returns the table of all rivals by their ratings.
+    pub(crate) fn ladder(&self) -> Ladder {
+        let bots: Vec<String> = self.bots.iter().map(|(name, _)| name.clone()).collect();
+        let drawn = self.drawn().iter().map(|(snapshot, _)| *snapshot).collect::<Vec<_>>();
+        ladder_of(&bots, self.config.rivals.len(), &self.state.steps, &drawn, &self.state.encounters)
+    }
+
+    /// Returns the metrics by their tags.
+    pub(crate) fn scalars(&self) -> Vec<(&'static str, f64)> {
+        let recent = &self.state.recent;
+        let share = |outcome| recent.iter().filter(|it| **it == outcome).count() as f64 / recent.len() as f64;
+        let mut scalars = vec![("self_play/snapshots", self.state.steps.len() as f64)];
+        if !recent.is_empty() {
+            scalars.push((WIN_RATE, share(MatchOutcome::Win)));
+            scalars.push((DRAW_RATE, share(MatchOutcome::Draw)));
+        }
+        let newest = self.ladder().members.into_iter().rfind(|member| member.step.is_some());
+        // The first snapshot is not rated before there is another one.
+        if let Some(Rating { elo, error }) = newest.and_then(|member| member.rating).filter(|it| it.error > 0.0) {
+            scalars.extend([(ELO, elo), ("self_play/elo_error", error)]);
+        }
+        scalars
+    }
+
+    // Checkpoints.
+
+    /// Returns what a checkpoint keeps besides policies, `arenas` being the rivals of each arena.
+    pub(crate) fn state(&self, arenas: Vec<ArenaRivals>) -> SelfPlayState {
+        SelfPlayState { arenas, ..self.state.clone() }
+    }
+
+    /// Writes the policies of all snapshots that a checkpoint of this state needs into its folder.
+    ///
+    /// # Errors
+    ///
+    /// [`FileError`].
+    pub(crate) fn save(
+        &self,
+        folder: &Path,
+        state: Option<&SelfPlayState>,
+        observation_config: &ObservationConfig,
+        skills: Option<&SkillSource>,
+        algorithm: &str,
+    ) -> Result<(), FileError> {
+        let (all, playing) = (self.state.steps.len(), state.map_or(&[][..], |state| &state.arenas));
+        let kept = self.snapshots.iter().filter(|(it, _)| is_kept(*it, all, &self.config, playing));
+        for (snapshot, policy) in kept {
+            let step = self.state.steps.get(*snapshot).copied().unwrap_or_default();
+            let training = format!("snapshot of a training by self-play, at step {step}");
+            let code = format!("playbot {}", env!("CARGO_PKG_VERSION"));
+            let provenance = Provenance { algorithm: algorithm.to_owned(), training, seen: None, code };
+            let (policy, skills) = (policy.clone(), skills.cloned());
+            let file = policy_file(&*self.seats[0], observation_config, policy, skills, provenance);
+            let obs = Observations::zeros(&file.policy.observation(), 1);
+            file.save(&snapshot_file(folder, *snapshot), &obs, &vec![0.0; file.policy.latent()], 1)?;
+        }
+        Ok(())
+    }
+
+    /// Goes on from a checkpoint, whose policies were read by [`read_snapshots`]. Returns the rivals of each arena.
+    pub(crate) fn restore(&mut self, mut state: SelfPlayState, snapshots: Vec<(usize, Policy)>) -> Vec<ArenaRivals> {
+        let arenas = std::mem::take(&mut state.arenas);
+        (self.state, self.snapshots) = (state, snapshots);
+        arenas
+    }
+}
+
+/// Returns the file of a snapshot in the folder of a checkpoint.
+fn snapshot_file(folder: &Path, snapshot: usize) -> PathBuf {
+    folder.join(format!("snapshot-{snapshot:04}.policy"))
+}
+
+/// Reads the policies of the snapshots that a checkpoint of this state needs: those that may be drawn, and those that
+/// play in episodes that still run.
+///
+/// # Errors
+///
+/// [`FileError`]: one of them is missing or damaged.
+pub(crate) fn read_snapshots(
+    folder: &Path,
+    config: &SelfPlayConfig,
+    state: &SelfPlayState,
+    device: DeviceKind,
+) -> Result<Vec<(usize, Policy)>, FileError> {
+    let all = state.steps.len();
+    let read = |snapshot| Ok((snapshot, PolicyFile::load(&snapshot_file(folder, snapshot), device)?.policy));
+    (0..all).filter(|snapshot| is_kept(*snapshot, all, config, &state.arenas)).map(read).collect()
+}
+
+/// Returns the number of snapshots that are drawn.
+fn pool_of(config: &SelfPlayConfig) -> usize {
+    usize::try_from(config.pool).unwrap_or(usize::MAX)
+}
+
+/// Returns whether a snapshot, of so many, may be drawn or is the newest one, or plays in an episode that still runs.
+fn is_kept(snapshot: usize, all: usize, config: &SelfPlayConfig, arenas: &[ArenaRivals]) -> bool {
+    let number = config.bots().count() + snapshot;
+    snapshot.saturating_add(pool_of(config).max(1)) >= all || arenas.iter().any(|arena| arena.needs(number))
+}
