@@ -25,6 +25,7 @@ mod recorded_players;
 mod recorded_rewards;
 mod recording;
 mod rewards;
+mod rivals;
 mod skills_held;
 mod takeover;
 mod trails;

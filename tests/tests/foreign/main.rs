@@ -18,5 +18,6 @@ mod randomised;
 mod rebuild;
 mod resets;
 mod restarts;
+mod rivals;
 mod snapshots;
 mod starts;

@@ -8,7 +8,7 @@ use bevy_playbot::{policy::ActionDraw, unknown_name::UnknownName};
 use playbot_harness::{
     eval::all_bots,
     game::Game,
-    rivals::{Opposed, RivalError, check_rivals, find_seat},
+    rivals::{RivalError, check_rivals, find_seat},
 };
 use playbot_learner::DeviceKind;
 use playbot_train::{checkpoint::CheckpointChoice, run_dir::RunDir};
@@ -21,7 +21,7 @@ pub struct RivalArgs {
     /// a run.
     #[arg(long, value_name = "RIVAL")]
     pub rival: Option<String>,
-    /// Seat of the player, by its name (default: all, where matches are measured, or else the first).
+    /// Seat of the player, by its name (default: all of them, one after the other).
     #[arg(long, value_name = "NAME", requires = "rival")]
     pub seat: Option<String>,
 }
@@ -75,17 +75,5 @@ impl RivalArgs {
     /// The game has no such seat.
     pub fn seat(&self, game: &dyn Game) -> Result<Option<usize>, RivalError> {
         self.seat.as_deref().map(|name| find_seat(game, name)).transpose()
-    }
-
-    /// Returns the game as the player on its seat meets it beside the rival; `None` if none is named. Agents of the
-    /// player's own team are played by the rival, too.
-    ///
-    /// # Errors
-    ///
-    /// As for [`load`](Self::load).
-    pub fn oppose(&self, game: &dyn Game, mode: &str, device: DeviceKind) -> Result<Option<Opposed>, CliError> {
-        let Some(rival) = self.load(game, mode, ActionDraw::Sample, device)? else { return Ok(None) };
-        let seat = self.seat(game)?.unwrap_or_default();
-        Ok(Some(Opposed::new(game, seat)?.against(rival.player.clone(), rival.player)))
     }
 }

@@ -18,6 +18,7 @@ use playbot_train::{
     Experiment,
     diagnose::{DiagnoseError, Diagnosis, Evidence, Gathering, diagnose, of_game, of_recordings, of_run},
     run_dir::RunDir,
+    self_play::ladder::Ladder,
 };
 use std::{
     path::{Path, PathBuf},
@@ -170,7 +171,9 @@ fn write_page(out: &Path, args: &Args, diagnosis: &Diagnosis) -> Result<(), CliE
         (None, None) => diagnosis.context.game.clone(),
     };
     let subtitle = format!("{} on {}", diagnosis.context.algorithm, diagnosis.context.train);
-    let report = Report { title: format!("Diagnosis of {subject}"), subtitle, sections: vec![diagnosis.section()] };
+    let ladder = args.run.as_deref().map(Ladder::read).transpose()?.flatten();
+    let sections = [diagnosis.section()].into_iter().chain(ladder.map(|ladder| ladder.section())).collect();
+    let report = Report { title: format!("Diagnosis of {subject}"), subtitle, sections };
     report.write(out).map_err(|error| CliError::Io(error.to_string()))?;
     report!("{}", out.display());
     Ok(())

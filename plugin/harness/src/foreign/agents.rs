@@ -31,7 +31,8 @@ impl ForeignGame {
     /// Agents share keyboard, mouse and touch screen, so each needs keys of its own: see [`keys_of`](Self::keys_of). Each
     /// has a gamepad of its own. Keys that two agents hold are a [`problem`](crate::game::Game::problem).
     ///
-    /// Trainings and evaluations play all agents by one policy, each with its own observation. Everything that records,
+    /// Trainings and evaluations play all agents by one policy, each with its own observation, unless they have
+    /// [rivals](crate::rivals). Everything that records,
     /// replays, tests or explores plays the first agent, and the others play along: by the
     /// [`demonstrator`](Self::demonstrator) without noise, or at random (`chaos`) in a game without one. What they do
     /// depends on the level, and on what happens in it. So a recording holds the actions of the first agent alone, and

@@ -2,7 +2,7 @@
 
 use playbot_harness::sealed_file::{SealedFileError, read_sealed, write_sealed};
 use playbot_report::{
-    Chart, Curve, PlainTable, percent,
+    Chart, Curve, PlainTable, Section, Table, percent,
     ratings::{Encounter, Rating, elo},
     whole,
 };
@@ -123,6 +123,19 @@ impl Ladder {
         });
         let columns = ["rival", "elo", "error", "matches", "score", "plays"];
         PlainTable { columns: columns.map(str::to_owned).to_vec(), rows: rows.collect(), ..PlainTable::default() }
+    }
+
+    /// Returns the part of a run's report with table and chart.
+    pub fn section(&self) -> Section {
+        let text = "Snapshots of the policy and bots, by Elo ratings from matches on held-out levels, from all seats. The rating \
+                    of the first of them is set to 1000.";
+        Section {
+            heading: "Rivals".to_owned(),
+            text: text.to_owned(),
+            charts: vec![self.to_chart()],
+            tables: vec![Table::Plain(self.to_table())],
+            code: Vec::new(),
+        }
     }
 
     /// Returns the ratings of the snapshots over their steps, with intervals of 95 %, beside those of the bots.

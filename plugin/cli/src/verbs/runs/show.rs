@@ -17,6 +17,7 @@ use playbot_train::{
     diagnose::of_metrics,
     metrics_log::{EPISODIC_RETURN, SUCCESS_RATE, range_of},
     runs::{RunCurves, RunRecord, changed_settings, with_defaults},
+    self_play::ladder::Ladder,
 };
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -54,16 +55,26 @@ pub(crate) fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
             run.path.display()
         )));
     }
+    let ladder = Ladder::read(&run.path)?;
     if args.json {
-        print_line(full_json(&run))?;
+        let mut all = full_json(&run);
+        if let Some(ladder) = &ladder {
+            all["ladder"] = json!(ladder);
+        }
+        print_line(all)?;
     } else {
         print_findings(&run)?;
         print_head(&run, games)?;
         print_curves(&curves)?;
         print_table(&metrics(&run))?;
+        if let Some(ladder) = &ladder {
+            print_line("")?;
+            print_table(&ladder.to_table())?;
+        }
     }
     if let Some(path) = &args.plot {
-        let charts: Vec<Chart> = curves.into_iter().map(|(tag, curve)| chart(&run, tag, curve)).collect();
+        let mut charts: Vec<Chart> = curves.into_iter().map(|(tag, curve)| chart(&run, tag, curve)).collect();
+        charts.extend(ladder.map(|ladder| ladder.to_chart()));
         write_plot(path, &to_svg(&charts))?;
     }
     Ok(Outcome::Pass)
