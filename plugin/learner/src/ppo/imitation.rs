@@ -177,9 +177,9 @@ impl LabelledSteps {
         if !is_ordered || header.begins.last().is_some_and(|&row| row >= rows) {
             return Err(file.format("its episodes do not begin in ascending rows".to_owned()));
         }
-        let product = |of: &TensorFile, what: &str, width: usize| match rows {
-            0 => Ok(0),
-            rows => of.product(what, &[rows, width]),
+        let product = |of: &TensorFile, what: &str, width: usize| match (rows, width) {
+            (0, _) | (_, 0) => Ok(0),
+            (rows, width) => of.product(what, &[rows, width]),
         };
         let numbers = product(&file, "obs", spec.obs.numbers())?;
         let obs = match spec.obs {
@@ -366,6 +366,9 @@ impl Order {
 fn remembered(policy: &Policy, steps: &LabelledSteps) -> Result<Vec<f32>, LearnError> {
     let (width, numbers, n) = (policy.memory(), policy.obs_dim(), steps.len());
     let mut before = vec![0.0; n * width];
+    if width == 0 {
+        return Ok(before);
+    }
     let ends = steps.begins.iter().skip(1).copied().chain([n]);
     let episodes: Vec<(usize, usize)> = steps.begins.iter().copied().zip(ends).collect();
     // The last tick of an episode leaves nothing to remember.
@@ -530,21 +533,18 @@ mod tests {
     #[test]
     fn a_policy_with_memory_learns_what_depends_on_an_earlier_tick() {
         let (steps, others) = (cued(200), cued(300));
-        let config = ImitationConfig { lr: 1e-2, epochs: 12, batch: 120, ..ImitationConfig::default() };
+        let config = ImitationConfig { lr: 1e-2, epochs: 60, batch: 120, ..ImitationConfig::default() };
         let right = |memory| {
             let mut learner = with_memory(memory);
             learner.imitate(&steps, 0, &config).expect("finite");
             right_at_the_end(&learner, &others)
         };
         let [none, gru, stack] =
-            [MemoryKind::None, MemoryKind::Gru { hidden: 8, sequence: 3, burn_in: 0 }, MemoryKind::Stack { ticks: 6 }]
+            [MemoryKind::None, MemoryKind::Gru { hidden: 16, sequence: 6, burn_in: 0 }, MemoryKind::Stack { ticks: 6 }]
                 .map(right);
         assert!((0.3..0.7).contains(&none), "without memory the cue is gone: {none}");
         assert!(stack > 0.95, "{stack}");
-        // Its sequences are shorter than an episode: what leads from the first one into the second has no gradient.
-        assert!(gru > none - 0.3, "{gru}");
-        let whole = right(MemoryKind::Gru { hidden: 8, sequence: 6, burn_in: 0 });
-        assert!(whole > 0.95, "{whole}");
+        assert!(gru > 0.95, "{gru}");
     }
 
     #[test]

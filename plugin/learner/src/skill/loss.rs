@@ -58,9 +58,8 @@ fn nll_under_noise(forward: &SkillForward, noise: f64) -> Tensor<1> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ActionSpace;
     use crate::{
-        Actions, DeviceKind,
+        ActionSpace, Actions, DeviceKind,
         nn::{ActionBatch, host, matrix, vector},
     };
 
@@ -79,7 +78,7 @@ mod tests {
             prior_features: zeros(2),
             legal_count: None,
         };
-        let forward = forward.restricted(legal, ActionSpace::Discrete(3), &actions, &device).expect("choices");
+        let forward = forward.restricted(legal, ActionSpace::Discrete(4), &actions, &device).expect("choices");
         host(nll_under_noise(&forward, noise)).expect("readable")
     }
 
