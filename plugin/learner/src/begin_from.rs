@@ -139,7 +139,8 @@ impl InputMap {
                 let (new, old) =
                     if own.is_some() { ("as sets", "value by value") } else { ("value by value", "as sets") };
                 return Err(LearnError::Config(format!(
-                    "it reads sets of things {old}, and the new run {new}: give both the same `ppo.entities` and                      `skills.entities`"
+                    "it reads sets of things {old}, and the new run {new}: give both the same `ppo.entities` and \
+                     `skills.entities`"
                 )));
             }
         };

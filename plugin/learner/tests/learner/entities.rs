@@ -440,6 +440,7 @@ fn a_policy_gets_more_slots_and_values_beside_them_and_stays_the_same() {
         let error = |learner: &mut PpoLearner| learner.start_from(&start).expect_err("others").to_string();
         let text = error(&mut fresh(EntityKind::Flat));
         assert!(text.contains("it reads sets of things as sets, and the new run value by value"), "{text}");
+        assert!(text.contains("`ppo.entities` and `skills.entities`"), "{text}");
         let text = error(&mut fresh(EntityKind::Set { hidden: 8, blocks: vec![wide] }));
         assert!(text.contains("its sets of things are others"), "{text}");
     }
