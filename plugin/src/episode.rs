@@ -38,7 +38,6 @@ use crate::{
     carry_over::ReflectCarryComponent,
     fault::Faults,
     level::LevelQueue,
-    own_policy::OwnPolicy,
     reward::Reward,
     streams::{AgentStreams, EpisodeSeeds},
 };
@@ -278,16 +277,15 @@ pub(crate) fn begin_episodes(
     }
 }
 
-/// Begins an episode of an agent that [plays along](PlaysAlong), on the level of the agent whose episode begins now: by its
-/// [`OwnPolicy`], or as a bot. Call it where the game hears of the other one's [`StartEpisode`]. An episode that still runs is left.
+/// Begins an episode of an agent that [plays along](PlaysAlong), as a bot, on the level of the agent whose episode begins
+/// now. Call it where the game hears of the other one's [`StartEpisode`]. An episode that still runs is left.
 pub fn begin_beside(world: &mut World, agent: Entity, level: u64) {
     let Ok(mut agent) = world.get_entity_mut(agent) else { return };
     if let Some(mut reward) = agent.get_mut::<Reward>() {
         // Late reward of the episode before counts nowhere.
         let _ = reward.start_episode();
     }
-    let control = if agent.contains::<OwnPolicy>() { Control::Policy } else { Control::Bot };
-    agent.insert((control, Episode { level, state: EpisodeState::Running, ..default() }));
+    agent.insert((Control::Bot, Episode { level, state: EpisodeState::Running, ..default() }));
     let entity = agent.id();
     world.trigger(StartEpisode { entity, level });
 }

@@ -17,9 +17,9 @@ use crate::{
 use bevy::prelude::*;
 use playbot_learner::{Observations, Policy, PolicyOutput, rng::normal};
 
-/// A policy that drives this agent alone under [`Control::Policy`], in place of the World's
-/// [`ActivePolicy`](crate::policy::ActivePolicy), with skills of its own. An agent that
-/// [plays along](crate::agent::PlaysAlong) is under that control from its next episode on.
+/// A policy that plays this agent alone, with skills of its own, while the agent's control is [`Control::Bot`]. The World's
+/// [`ActivePolicy`](crate::policy::ActivePolicy) drives agents under [`Control::Policy`]. It takes the place of a bot of an
+/// agent that [plays along](crate::agent::PlaysAlong): take other bots away from the agent.
 #[derive(Component, Clone, Reflect)]
 #[reflect(opaque)]
 #[reflect(Component, CarryComponent, Clone)]
@@ -51,7 +51,7 @@ pub(crate) fn run_own_policies(
         else {
             continue;
         };
-        if *control != Control::Policy || !episode.is_running() {
+        if *control != Control::Bot || !episode.is_running() {
             continue;
         }
         let (observation, sensor, legal) = seen;
@@ -107,7 +107,7 @@ fn remember(memory: &mut AgentMemory, output: &PolicyOutput, width: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{engine::begin_beside, prelude::*, streams::AgentStreams};
+    use crate::{prelude::*, streams::AgentStreams};
     use playbot_learner::{DeviceKind, Learner as _, PolicySpec, PpoConfig, PpoLearner};
 
     fn policy(seed: u64) -> Policy {
@@ -129,7 +129,8 @@ mod tests {
             app.world_mut().spawn((agent, AgentStreams::new(3, 7))).id()
         });
         if let Some(policy) = own {
-            app.world_mut().entity_mut(agents[1]).insert(OwnPolicy { policy, draw: ActionDraw::Sample, skills: None });
+            let own = OwnPolicy { policy, draw: ActionDraw::Sample, skills: None };
+            app.world_mut().entity_mut(agents[1]).insert((own, Control::Bot));
         }
         let chosen = |app: &App, agent| app.world().get::<Action>(agent).and_then(Action::discrete);
         (0..50)
@@ -150,22 +151,9 @@ mod tests {
     }
 
     #[test]
-    fn an_agent_that_plays_along_is_played_by_its_own_policy() {
-        let mut app = headless_app();
-        let agent = (Agent::new(0, ActionSpace::Discrete(5)), VectorSensor::new(["x"]));
-        let agent = app.world_mut().spawn(agent).id();
-        begin_beside(app.world_mut(), agent, 3);
-        assert_eq!(Control::of(app.world(), agent), Control::Bot);
-        let own = OwnPolicy { policy: policy(1), draw: ActionDraw::Greedy, skills: None };
-        app.world_mut().entity_mut(agent).insert(own);
-        begin_beside(app.world_mut(), agent, 4);
-        assert_eq!(Control::of(app.world(), agent), Control::Policy);
-    }
-
-    #[test]
     fn a_policy_of_another_observation_is_a_fault_with_the_difference() {
         let mut app = headless_app();
-        let agent = (Agent::new(0, ActionSpace::Discrete(4)), VectorSensor::new(["x"]), Control::Policy);
+        let agent = (Agent::new(0, ActionSpace::Discrete(4)), VectorSensor::new(["x"]), Control::Bot);
         let agent = app.world_mut().spawn(agent).id();
         app.add_systems(ObserveSchedule, |mut agents: Query<&mut Observation>| {
             agents.iter_mut().for_each(|mut seen| seen.set([0.5]));

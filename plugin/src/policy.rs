@@ -32,7 +32,6 @@ use crate::{
     fault::Faults,
     legal::LegalActions,
     observation::Observation,
-    own_policy::OwnPolicy,
     policy_batch::{PolicyBatch, SharedBatch},
     skill_prior::{ActiveSkill, SkillPrior},
     streams::AgentStreams,
@@ -105,25 +104,21 @@ pub(crate) fn forget(mut agents: Query<(&Episode, &mut AgentMemory)>) {
     }
 }
 
-/// Decides for all agents under [`Control::Policy`] in one batched forward pass, among their [`LegalActions`]. Those with
-/// an [`OwnPolicy`] are left to it.
+/// Decides for all agents under [`Control::Policy`] in one batched forward pass, among their [`LegalActions`].
 pub(crate) fn run_policy(
     active: Res<ActivePolicy>,
     (shared, prior): (Option<Res<SharedBatch>>, Option<Res<SkillPrior>>),
     order: Res<AgentOrder>,
-    mut agents: Query<
-        (
-            &Agent,
-            &Control,
-            &Episode,
-            (&Observation, Option<&ImageSensor>, Option<&LegalActions>),
-            (&ActiveSkill, Option<&mut AgentMemory>),
-            &mut AgentStreams,
-            &mut Action,
-            &mut Decision,
-        ),
-        Without<OwnPolicy>,
-    >,
+    mut agents: Query<(
+        &Agent,
+        &Control,
+        &Episode,
+        (&Observation, Option<&ImageSensor>, Option<&LegalActions>),
+        (&ActiveSkill, Option<&mut AgentMemory>),
+        &mut AgentStreams,
+        &mut Action,
+        &mut Decision,
+    )>,
     mut faults: ResMut<Faults>,
     mut batch: ResMut<PolicyBatch>,
 ) {

@@ -25,7 +25,6 @@ use crate::{
     episode::Episode,
     fault::Faults,
     observation::Observation,
-    own_policy::OwnPolicy,
     streams::AgentStreams,
     vision::{ImageSensor, seen_as},
 };
@@ -153,10 +152,7 @@ pub(crate) fn end_skills(mut agents: Query<(&Episode, &mut ActiveSkill)>) {
 pub fn draw_skills(
     prior: Res<SkillPrior>,
     order: Res<AgentOrder>,
-    mut agents: Query<
-        (&Agent, &Control, &Episode, &Observation, &mut ActiveSkill, &mut AgentStreams),
-        Without<OwnPolicy>,
-    >,
+    mut agents: Query<(&Agent, &Control, &Episode, &Observation, &mut ActiveSkill, &mut AgentStreams)>,
     sensors: Query<&ImageSensor>,
     mut faults: ResMut<Faults>,
 ) {

@@ -216,7 +216,7 @@ fn hand_over(game: &dyn Game, world: &mut World, agent: Entity, player: &Player)
         let own = OwnPolicy { policy: policy.clone(), draw: *draw, skills: prior.clone() };
         world.entity_mut(agent).insert(own);
     } else {
-        // The episode of an agent that plays along begins under the control of a bot.
+        // Agents that play along are under the control of a bot anyway.
         let _ = player.seat(game, world, agent);
     }
 }

@@ -1,6 +1,6 @@
 //! Collection of rollouts: a World that plays with the current policy.
 
-use crate::self_play::seats::{ArenaRivals, RivalSeats};
+use crate::rival_seats::{ArenaRivals, RivalSeats};
 use bevy::prelude::*;
 use bevy_playbot::{
     action::{Action, ActionSpace, ActionValue},

@@ -37,6 +37,7 @@ pub mod metrics_log;
 pub mod pipeline;
 pub mod policy_export;
 pub mod recordings;
+mod rival_seats;
 pub mod run_dir;
 pub mod run_observer;
 pub mod runs;

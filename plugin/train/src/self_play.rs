@@ -1,28 +1,23 @@
 //! Training against rivals: snapshots of the policy and scripted bots, drawn for each episode, and their ratings.
 //!
 //! One agent of each arena learns, on a seat that the arena keeps: arena n has seat n modulo the number of seats, so each
-//! seat learns equally often. The others play along by the rivals of a [`RivalPool`], as
+//! seat learns equally often. The others play along by the rivals of a pool, as
 //! [`rivals`](playbot_harness::rivals) describes. The rival of an episode is drawn from a stream of the run's seed, the
-//! arena and the number of its episode, so the number of threads changes nothing. All that is decided later depends on
-//! is in [`SelfPlayState`] and in the policies of [`snapshots`](SelfPlay::kept), which a checkpoint keeps.
+//! arena and the number of its episode, so the number of threads changes nothing. All that later
+//! draws and ratings depend on is in `SelfPlayState` and in the policies of snapshots, which a checkpoint keeps.
 //!
 //! The folder:
 //!
 //! - `ladder`: the table of all rivals by their ratings, and its file in a run.
-//! - `seats`: the rivals of one arena, episode by episode.
 
 pub mod ladder;
-pub(crate) mod seats;
 
 use crate::{
     error::TrainError,
     experiment::{Experiment, SelfPlayConfig},
     metrics_log::RECENT,
-    policy_export::{Provenance, policy_file},
-    self_play::{
-        ladder::{Ladder, ladder_of},
-        seats::{ArenaRivals, RivalPool, RivalSeats},
-    },
+    rival_seats::{ArenaRivals, RivalPool, RivalSeats},
+    self_play::ladder::{Ladder, ladder_of},
 };
 use bevy_playbot::{policy::ActionDraw, skill_prior::SkillPrior, vision::ObservationConfig};
 use playbot_harness::{
@@ -34,7 +29,7 @@ use playbot_harness::{
         scripted_rival,
     },
 };
-use playbot_learner::{DeviceKind, FileError, Observations, Policy, PolicyFile, SkillSource};
+use playbot_learner::{DeviceKind, FileError, Observations, Policy, PolicyFile, PolicyMetadata, SkillSource};
 use playbot_report::ratings::{Encounter, Rating};
 use serde::{Deserialize, Serialize};
 use std::{
@@ -275,11 +270,19 @@ impl SelfPlay {
         let kept = self.snapshots.iter().filter(|(it, _)| is_kept(*it, all, &self.config, playing));
         for (snapshot, policy) in kept {
             let step = self.state.steps.get(*snapshot).copied().unwrap_or_default();
-            let training = format!("snapshot of a training by self-play, at step {step}");
-            let code = format!("playbot {}", env!("CARGO_PKG_VERSION"));
-            let provenance = Provenance { algorithm: algorithm.to_owned(), training, seen: None, code };
-            let (policy, skills) = (policy.clone(), skills.cloned());
-            let file = policy_file(&*self.seats[0], observation_config, policy, skills, provenance);
+            let (game, seen) = (&*self.seats[0], observation_config);
+            let metadata = PolicyMetadata {
+                game: game.name().to_owned(),
+                game_version: game.version(),
+                observations: game.observation().names,
+                picture: seen.picture_metadata(),
+                actions: game.tools().input.action_names(),
+                algorithm: algorithm.to_owned(),
+                training: format!("snapshot of a training by self-play, at step {step}"),
+                seen: None,
+                code: format!("playbot {}", env!("CARGO_PKG_VERSION")),
+            };
+            let file = PolicyFile { metadata, policy: policy.clone(), skills: skills.cloned() };
             let obs = Observations::zeros(&file.policy.observation(), 1);
             file.save(&snapshot_file(folder, *snapshot), &obs, &vec![0.0; file.policy.latent()], 1)?;
         }

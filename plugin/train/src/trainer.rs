@@ -1,5 +1,11 @@
 //! The training loop, one update at a time, with its progress, and the learner of each algorithm. The caller owns the
 //! progress bar and decides when to stop.
+//!
+//! The folder:
+//!
+//! - `rivals`: what a trainer against rivals does between its rollouts.
+
+mod rivals;
 
 use crate::{
     checkpoint::CheckpointSummary,
@@ -8,7 +14,7 @@ use crate::{
     experiment::{Algorithm, Experiment, ExperimentError, LearnerKind},
     levels::{EndedEpisode, LevelPlan, LevelState},
     metrics_log::{RECENT, Timing, UpdateReport},
-    self_play::{SelfPlay, SelfPlayState, ladder::Ladder, seats::ArenaRivals},
+    self_play::SelfPlay,
 };
 use bevy::prelude::World;
 use bevy_playbot::{
@@ -39,7 +45,7 @@ use std::{
     collections::VecDeque,
     ops::{Deref, DerefMut, RangeInclusive},
     path::Path,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Mutex, PoisonError},
     time::{Duration, Instant},
 };
 
@@ -238,62 +244,6 @@ impl Trainer {
         Ok(report)
     }
 
-    /// Lets the next episodes have the present rivals, `policy` being the first of them.
-    fn renew_rivals(&mut self, policy: &Policy) {
-        let Some(self_play) = &mut self.self_play else { return };
-        self_play.begin(policy);
-        let Some(pool) = self_play.pool().map(Arc::new) else { return };
-        self.collectors.iter_mut().filter_map(Collector::rivals_mut).for_each(|rivals| rivals.set_pool(&pool));
-    }
-
-    /// Notes the results of a rollout against rivals, and adds a snapshot of the policy to them if one is due.
-    fn rate_rivals(&mut self, before: u64) -> Result<(), TrainError> {
-        let (step, is_done) = (self.progress.steps, self.is_done());
-        let Some(self_play) = &mut self.self_play else { return Ok(()) };
-        let rivals = self.collectors.iter_mut().filter_map(Collector::rivals_mut);
-        let (playing, outcomes): (Vec<_>, Vec<_>) = rivals.map(|it| (it.state(), it.take_outcomes())).unzip();
-        self_play.note(outcomes.into_iter().flatten());
-        self_play.after_update([before, step], is_done, &self.learner.policy(), &playing)
-    }
-
-    /// Returns what a checkpoint keeps of a training against rivals.
-    pub(crate) fn self_play_state(&mut self) -> Option<SelfPlayState> {
-        let arenas = self.collectors.iter_mut().filter_map(Collector::rivals_mut).map(|it| it.state()).collect();
-        self.self_play.as_ref().map(|it| it.state(arenas))
-    }
-
-    /// Returns the training against rivals, if it is one.
-    pub(crate) fn self_play(&self) -> Option<&SelfPlay> {
-        self.self_play.as_ref()
-    }
-
-    /// Returns the rivals by their ratings; `None` in a training without rivals.
-    pub fn ladder(&self) -> Option<Ladder> {
-        self.self_play.as_ref().map(SelfPlay::ladder)
-    }
-
-    /// Goes on with the rivals of a checkpoint, in a fresh trainer, before its arenas are restored.
-    ///
-    /// # Errors
-    ///
-    /// [`RestoreError`] if the checkpoint lacks a rival.
-    pub(crate) fn restore_self_play(
-        &mut self,
-        state: SelfPlayState,
-        snapshots: Vec<(usize, Policy)>,
-    ) -> Result<(), RestoreError> {
-        let Some(self_play) = &mut self.self_play else { return Ok(()) };
-        let arenas = self_play.restore(state, snapshots);
-        let wanted = self.collectors.len();
-        if arenas.len() != wanted {
-            return Err(RestoreError::Count { saved: arenas.len(), wanted });
-        }
-        for (collector, state) in self.collectors.iter_mut().zip(arenas) {
-            collector.restore_rivals(state, |number| self_play.find(number))?;
-        }
-        Ok(())
-    }
-
     /// Decides which levels are played next, from the episodes of a rollout, each with its agent.
     fn note_levels(&mut self, rollout: &Rollout, finished: &[(usize, Ended)]) {
         if !self.plan.decides() {
@@ -319,11 +269,9 @@ impl Trainer {
     fn change_worlds(&mut self, lesson: usize) {
         let Some((_, collectors)) = self.later.pop_front_if(|(first, _)| *first == lesson) else { return };
         let streams: Vec<_> = self.collectors.iter().flat_map(Collector::streams).collect();
-        let rivals = self.collectors.iter_mut().filter_map(Collector::rivals_mut).map(|it| it.state());
-        let rivals: Vec<ArenaRivals> = rivals.collect();
+        let rivals = self.arena_rivals();
         self.collectors = collectors;
-        let seats = self.collectors.iter_mut().filter_map(Collector::rivals_mut);
-        seats.zip(rivals).for_each(|(seats, state)| seats.set_state(state));
+        self.set_arena_rivals(rivals);
         let mut rest = streams.as_slice();
         for collector in &mut self.collectors {
             let (own, others) = rest.split_at(collector.agents().len().min(rest.len()));

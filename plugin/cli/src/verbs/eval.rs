@@ -357,3 +357,104 @@ fn look_through(
 fn named(chosen: LoadedPlayer, path: &Path, of: usize) -> LoadedPlayer {
     if of > 1 { LoadedPlayer { name: format!("{} {}", chosen.name, path.display()), ..chosen } } else { chosen }
 }
+
+#[cfg(test)]
+mod tests {
+    use bevy::prelude::{App, KeyCode, Res, Resource};
+    use clap::Parser;
+    use playbot_harness::foreign::{ForeignGame, PlayedAgent};
+    use playbot_harness::prelude::*;
+    use playbot_learner::{DeviceKind, Learner as _, PolicyFile, PolicyMetadata, PolicySpec, PpoConfig, PpoLearner};
+
+    use super::*;
+
+    /// The words of the verb.
+    #[derive(Parser)]
+    struct Eval {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    #[derive(Resource, Default)]
+    struct Ticks(u32);
+
+    /// A game that the agent on the first seat wins after three ticks.
+    fn unfair() -> ForeignGame {
+        ForeignGame::new("unfair", 1, |app: &mut App| {
+            app.init_resource::<Ticks>()
+                .add_systems(bevy::prelude::Update, |mut ticks: bevy::prelude::ResMut<Ticks>| ticks.0 += 1);
+        })
+        .agents(["one", "other"])
+        .keys([vec![], vec![KeyCode::KeyA]])
+        .keys_of("other", [vec![], vec![KeyCode::KeyB]])
+        .observe(["x"], || [0.0])
+        .level(|mut ticks: bevy::prelude::ResMut<Ticks>| ticks.0 = 0)
+        .end(|ticks: Res<Ticks>, agent: Res<PlayedAgent>| {
+            let end = if agent.0 == 0 { EpisodeEnd::WON } else { EpisodeEnd::LOST };
+            (ticks.0 > 3).then_some(end)
+        })
+        .demonstrator("idler", || 0_u32)
+    }
+
+    fn eval(game: &ForeignGame, more: &[&str]) -> Result<Outcome, String> {
+        let words = [&["eval", game.name(), "--bot", "idler", "--levels", "default:0..3"], more].concat();
+        let args = Eval::try_parse_from(words).map_err(|error| error.to_string())?.args;
+        let games = [game as &dyn Game];
+        run(args, &Games::new(&games).expect("one game")).map_err(|error| error.to_string())
+    }
+
+    fn policy_of(game: &str, path: &Path) {
+        let spec = PolicySpec { obs: 1.into(), latent: 0, action_space: ActionSpace::Discrete(2) };
+        let config = PpoConfig { hidden: vec![4], ..PpoConfig::default() };
+        let policy = PpoLearner::new(config, spec, 1, DeviceKind::Flex).expect("valid").policy();
+        let metadata = PolicyMetadata {
+            game: game.to_owned(),
+            game_version: 1,
+            observations: vec!["x".to_owned()],
+            ..PolicyMetadata::default()
+        };
+        PolicyFile { metadata, policy, skills: None }.save(path, &[0.5_f32], &[], 1).expect("writable");
+    }
+
+    #[test]
+    fn matches_are_played_on_both_seats_or_on_the_one_that_is_named() {
+        let (half, all) = (["--rival", "idler", "--at-least"], "success=0.5");
+        assert!(matches!(eval(&unfair(), &[&half[..], &[all]].concat()), Ok(Outcome::Pass)), "one of two seats wins");
+        let more = [&half[..], &["success=0.6"]].concat();
+        assert!(matches!(eval(&unfair(), &more), Ok(Outcome::Findings)));
+        let one = |seat| [&half[..], &["success=1", "--seat", seat]].concat();
+        assert!(matches!(eval(&unfair(), &one("one")), Ok(Outcome::Pass)));
+        assert!(matches!(eval(&unfair(), &one("other")), Ok(Outcome::Findings)));
+    }
+
+    #[test]
+    fn a_policy_is_a_rival_if_it_is_of_the_game() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (own, others) = (folder.path().join("own.policy"), folder.path().join("others.policy"));
+        policy_of("unfair", &own);
+        policy_of("chess", &others);
+        let against = |path: &Path| eval(&unfair(), &["--rival", &path.display().to_string()]).map(drop);
+        assert_eq!(against(&own), Ok(()));
+        let error = against(&others).expect_err("of another game");
+        assert!(error.contains("others.policy: the policy was made for the game `chess`, not for `unfair`"), "{error}");
+        let error = against(&folder.path().join("no.policy")).expect_err("no such file");
+        assert!(error.contains("no.policy"), "{error}");
+    }
+
+    #[test]
+    fn rivals_and_seats_that_do_not_exist_are_refused_with_those_that_do() {
+        let error = eval(&unfair(), &["--rival", "idlr"]).map(drop).expect_err("no such rival");
+        let expected = "unknown rival `idlr` (did you mean `idler`?); valid: idler, random, chaos; or name a policy file, or the \
+                        folder of a run";
+        assert_eq!(error, expected);
+        let error = eval(&unfair(), &["--rival", "idler", "--seat", "oter"]).map(drop).expect_err("no such seat");
+        assert_eq!(error, "unknown seat `oter` (did you mean `other`?); valid: one, other");
+        assert!(eval(&unfair(), &["--seat", "one"]).is_err(), "a seat is one of a match");
+        let alone = ForeignGame::new("alone", 1, |_: &mut App| {})
+            .keys([vec![], vec![KeyCode::KeyA]])
+            .observe(["x"], || [0.0])
+            .demonstrator("idler", || 0_u32);
+        let error = eval(&alone, &["--rival", "idler"]).map(drop).expect_err("no seat for a rival");
+        assert!(error.starts_with("a World of `alone` has one agent, so it has no rivals"), "{error}");
+    }
+}

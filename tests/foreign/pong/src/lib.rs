@@ -35,6 +35,8 @@ pub fn pong() -> ForeignGame {
         .state_hash(|table: Res<Table>| hash(&table))
         .restart(Restart::system(|| {}))
         .level(|level: Res<LevelSeed>, mut table: ResMut<Table>| *table = Table::of(level.0))
+        // No two numbers have the same serves to the same sides.
+        .layout(|_, level| level)
         .demonstrator("follower", |table: Res<Table>, player: Res<PlayedAgent>| follow(&of_left(&table, player.0)))
 }
 

@@ -1,4 +1,4 @@
-//! The rivals of one arena, episode by episode.
+//! The rivals of one arena of a training, episode by episode.
 
 use bevy::prelude::*;
 use bevy_playbot::episode::Episode;
@@ -19,12 +19,12 @@ const EPISODE_BITS: u32 = 40;
 /// The rivals that are drawn, each with its number on the ladder.
 #[derive(Clone)]
 pub(crate) struct RivalPool {
-    pub(super) seed: u64,
+    pub(crate) seed: u64,
     /// Probability of the newest snapshot.
-    pub(super) latest: f64,
-    pub(super) newest: (usize, Player),
+    pub(crate) latest: f64,
+    pub(crate) newest: (usize, Player),
     /// All of them: bots, then snapshots.
-    pub(super) all: Vec<(usize, Player)>,
+    pub(crate) all: Vec<(usize, Player)>,
 }
 
 impl RivalPool {
@@ -49,7 +49,7 @@ pub(crate) struct ArenaRivals {
 
 impl ArenaRivals {
     /// Returns whether the last episode was begun with the player of this number.
-    pub(super) fn needs(&self, number: usize) -> bool {
+    pub(crate) fn needs(&self, number: usize) -> bool {
         self.playing.is_some_and(|playing| playing.contains(&number))
     }
 }
@@ -64,7 +64,7 @@ pub(crate) struct RivalSeats {
 }
 
 impl RivalSeats {
-    pub(super) fn new(game: Arc<Opposed>, arena: u64) -> Self {
+    pub(crate) fn new(game: Arc<Opposed>, arena: u64) -> Self {
         Self { game, arena, pool: None, state: ArenaRivals::default(), outcomes: Vec::new() }
     }
 
