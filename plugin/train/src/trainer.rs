@@ -3,7 +3,7 @@
 //!
 //! The folder:
 //!
-//! - `rivals`: what a trainer against rivals does between its rollouts.
+//! - `rivals`: rivals of a trainer, between its rollouts and in its checkpoints.
 
 mod rivals;
 

@@ -1,4 +1,4 @@
-//! What a trainer against rivals does between its rollouts, and for its checkpoints.
+//! Rivals of a trainer: their renewal between rollouts, their ratings, and their part of checkpoints.
 
 use crate::{
     collect::{Collector, RestoreError},

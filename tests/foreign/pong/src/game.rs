@@ -16,8 +16,8 @@ const REACH: i32 = 12;
 /// Way of a paddle in a frame.
 const PACE: i32 = 4;
 
-/// Way of a ball to the side in a frame: after the serve, and at most. Each return adds 1.
-const SPEEDS: [i32; 2] = [4, 8];
+/// Way of a ball to the side in a frame: after the serve, and at most. Each return adds 1, so that rallies end.
+pub const SPEEDS: [i32; 2] = [4, 14];
 
 /// Largest way of a ball up or down in a frame, hit with the end of a paddle.
 pub const STEEPEST: i32 = 6;

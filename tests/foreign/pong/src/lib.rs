@@ -3,7 +3,7 @@
 pub mod game;
 
 use bevy::{app::PluginGroupBuilder, diagnostic::FrameCountPlugin, input::InputPlugin, prelude::*, time::TimePlugin};
-use game::{HALF, KEYS, POINTS, STEEPEST, Table};
+use game::{HALF, KEYS, POINTS, SPEEDS, STEEPEST, Table};
 use playbot::harness::foreign::{ForeignGame, LevelSeed, PlayedAgent, Restart};
 use playbot::prelude::EpisodeEnd;
 
@@ -51,7 +51,7 @@ fn see(table: &Table) -> [f32; 8] {
     let [own, other] = table.paddles.map(|height| part(height, HALF.y));
     let [points, lost] = table.points.map(|points| points as f32 / POINTS as f32);
     let (ball, velocity) = (table.ball, table.velocity);
-    let flight = [part(velocity.x, 8), part(velocity.y, STEEPEST)];
+    let flight = [part(velocity.x, SPEEDS[1]), part(velocity.y, STEEPEST)];
     [own, other, part(ball.x, HALF.x), part(ball.y, HALF.y), flight[0], flight[1], points, lost]
 }
 
