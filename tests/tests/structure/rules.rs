@@ -25,7 +25,7 @@ const SMALL: usize = 40;
 /// Product files with fewer lines than [`SMALL`], at most.
 const MAX_SMALL: usize = 40;
 /// Product files of the workspace, at most.
-const MAX_FILES: usize = 597;
+const MAX_FILES: usize = 598;
 /// Public items that the documentation hides, at most.
 const MAX_HIDDEN: usize = 5;
 
