@@ -180,6 +180,8 @@ mod tests {
         // Stand-ins for Bevy's own, which its plugins would insert.
         "GlobalVolume",
         "TonemappingLuts",
+        // Inserted with each sensor.
+        "HasEntitySensors",
         // Carried over by the code that inserts them.
         "Renewal",
         "SharedBatch",
@@ -239,6 +241,7 @@ mod tests {
                 "BlindBot",
                 "Control",
                 "Decision",
+                "EntitySensor",
                 "EpisodeCount",
                 "EpisodeSeeds",
                 "EpisodeTrace",

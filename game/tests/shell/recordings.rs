@@ -160,7 +160,7 @@ fn recordings_are_shown_in_plain_words() {
         "coinrun, version 1 of its rules\n",
         "played by     search\n",
         "noise         20 % of the actions are random\n",
-        "actions       discrete (15 actions)\n",
+        "actions       15 discrete actions\n",
         "by bot 100 %\n",
     ] {
         assert!(shown.contains(words), "{shown}");

@@ -16,11 +16,11 @@ use playbot_harness::{
 };
 use playbot_learner::DeviceKind;
 use playbot_tests::training::{check_resuming, last_success_rate};
-use playbot_train::{Trainer, experiment::file::parse_experiment};
+use playbot_train::{Experiment, Trainer, experiment::file::parse_experiment};
 use std::path::Path;
 
 /// Rooms until the end.
-const ROOMS: u32 = 12;
+const ROOMS: u32 = 8;
 
 /// A hall of rooms. Each asks for a side, for a jump or none, and for a stick in one half: whoever gives all three gets
 /// into the next room, and time runs out soon.
@@ -74,7 +74,7 @@ fn hall() -> ForeignGame {
         .restart(Restart::system(|seed: Res<LevelSeed>, mut hall: ResMut<Hall>| {
             *hall = Hall { seed: seed.0 as u32, room: 0 };
         }))
-        .time_limit(30)
+        .time_limit(40)
 }
 
 #[test]
@@ -105,7 +105,7 @@ fn a_demonstrator_records_what_replays_and_wins() {
     let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
     world.insert_resource(Recorder::new(DemoWriter::create(&path, game.demo_header("default")).expect("fresh")));
     game.tools().bots.attach_demonstrator(&mut world, agents[0], 0.3);
-    world.entity_mut(agents[0]).insert((Recording::default(), LevelQueue::list([3, 4])));
+    world.entity_mut(agents[0]).insert((Control::Bot, Recording::default(), LevelQueue::list([3, 4])));
     while world.get::<Control>(agents[0]) != Some(&Control::Idle) {
         world.tick().expect("sound");
     }
@@ -116,22 +116,23 @@ fn a_demonstrator_records_what_replays_and_wins() {
     assert_eq!((report.episodes, report.divergences), (2, Vec::new()));
 }
 
-fn trainer(threads: usize) -> Trainer {
+fn trainer(steps: u64, threads: usize) -> Trainer {
     let text = r#"(game: "hall", train: "default:0..199", test: "default:200..299", steps: 32768, arenas: 8,
-        algorithm: "ppo", ppo: (num_steps: 128, minibatches: 4, epochs: 6, hidden: [32], lr: 0.005))"#;
+        algorithm: "ppo", ppo: (num_steps: 128, minibatches: 8, epochs: 8, hidden: [32], lr: 0.005, gamma: 0.8, ent_coef: 0.0))"#;
     let experiment = parse_experiment(text, Path::new("hall.ron")).expect("valid");
+    let experiment = Experiment { steps, ..experiment };
     Trainer::new(&hall(), &experiment, None, DeviceKind::Flex, threads).expect("fits")
 }
 
 #[test]
 fn ppo_learns_to_make_all_choices() {
-    let rate = last_success_rate(trainer(2)).expect("episodes ended");
+    let rate = last_success_rate(trainer(32_768, 2)).expect("episodes ended");
     assert!(rate > 0.9, "{rate}");
 }
 
 #[test]
 fn stops_and_threads_change_nothing() {
-    check_resuming(&hall(), trainer, 3);
+    check_resuming(&hall(), |threads| trainer(4096, threads), 2);
 }
 
 #[test]

@@ -161,7 +161,10 @@ fn an_episode_beside_a_policy_replays_to_the_same_hashes_beside_it_and_to_others
         world.remove_resource::<Recorder>();
         let same = verify_file(&game, &path, |_| {}).expect("readable");
         assert_eq!((same.episodes, same.divergences), (3, Vec::new()), "seat {seat}");
-        let other = verify_file(&beside(fresh_policy(1)), &path, |_| {}).expect("readable");
+        // Untrained policies hardly differ from one another.
+        let follower = scripted_rival(&pong(), "follower").expect("a bot of Pong");
+        let other = Opposed::new(&pong(), seat).expect("a seat").against(follower.clone(), follower);
+        let other = verify_file(&other, &path, |_| {}).expect("readable");
         assert!(!other.divergences.is_empty(), "another rival plays another game");
     }
 }

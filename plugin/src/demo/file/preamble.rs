@@ -221,8 +221,8 @@ mod tests {
 
     #[test]
     fn a_newer_format_is_said_even_when_its_fields_are_unknown() {
-        let error = decode(with_text("(format: 4, sound: [1, 2])").as_slice()).expect_err("newer");
-        assert!(matches!(error, DemoFault::NewerFormat { found: 4, newest: 3 }), "{error}");
+        let error = decode(with_text("(format: 5, sound: [1, 2])").as_slice()).expect_err("newer");
+        assert!(matches!(error, DemoFault::NewerFormat { found: 5, newest: 4 }), "{error}");
     }
 
     #[test]

@@ -516,7 +516,7 @@ mod tests {
         };
         assert_eq!(said("forest", 1), "it was found in the game `garden`, not in `forest`");
         assert!(said("garden", 2).starts_with("it was found in version 1 of `garden`, but this is version 2"));
-        assert!(said("garden", 1).starts_with("its actions are discrete (2 actions), but"));
+        assert!(said("garden", 1).starts_with("its actions are 2 discrete actions, but"));
     }
 
     #[test]
