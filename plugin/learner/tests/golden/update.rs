@@ -99,7 +99,7 @@ impl<'a> Update<'a> {
         for (i, &rows) in minibatches.iter().enumerate() {
             let batch = self.minibatch(rows);
             if i == 0 {
-                self.check_first_gradients(&batch);
+                check_first_gradients(case, self.nets.clone(), &batch, &self.config, self.score.as_ref());
             }
             let lr = case.number("lr");
             let (config, score) = (&self.config, self.score.as_ref());
@@ -157,6 +157,7 @@ impl<'a> Update<'a> {
             recall: None,
             left: None,
             logit_offsets: None,
+            free: None,
             ppo: PpoBatch {
                 actions: ActionBatch::new(&actions("in.actions"), &device),
                 old_log_probs: vector(pick("in.old_log_probs")),
@@ -194,16 +195,50 @@ impl<'a> Update<'a> {
             self.case.check_entry(name, i, got);
         }
     }
+}
 
-    /// Checks gradients: a step with learning rate 0 and β = 0 leaves the unclipped gradient in Adam's first moment.
-    fn check_first_gradients(&self, batch: &Minibatch) {
-        let mut nets = self.nets.clone();
-        let mut adam = Adam::new(AdamConfig { beta1: 0.0, beta2: 0.0, ..AdamConfig::default() });
-        let config = PpoConfig { max_grad_norm: 1e30, ..self.config.clone() };
-        let score = self.score.as_ref();
-        gradient_step(&mut nets, &mut adam, batch, &config, score, 0.0).expect("finite");
-        check_gradients(self.case, "step1_grad.", ("", ""), &mut nets, &adam);
+/// Does the step of a case with its settings, and compares gradients, losses and the weights after it.
+pub fn check_step(case: &Case, mut nets: PpoNets, batch: &Minibatch, score: Option<&ScoreConfig>) {
+    let config = PpoConfig {
+        clip: case.number("clip"),
+        vf_coef: case.number("vf_coef"),
+        ent_coef: case.number("ent_coef"),
+        max_grad_norm: case.number("max_grad_norm"),
+        ..PpoConfig::default()
+    };
+    check_first_gradients(case, nets.clone(), batch, &config, score);
+    let mut adam = Adam::new(AdamConfig { eps: case.number("adam_eps"), ..AdamConfig::default() });
+    let step = gradient_step(&mut nets, &mut adam, batch, &config, score, case.number("lr")).expect("finite");
+    for (name, got) in [
+        ("policy_loss", step.policy_loss),
+        ("value_loss", step.value_loss),
+        ("entropy", step.entropy),
+        ("total_loss", step.total_loss),
+        ("approx_kl", step.approx_kl),
+        ("clip_fraction", step.clip_fraction),
+        ("grad_norm", step.grad_norm),
+        ("decoder_kl", step.decoder_kl),
+        ("kl_penalty", step.kl_penalty),
+    ] {
+        if case.expects(name) {
+            case.check_number(name, got);
+        }
     }
+    nets.visit("", &mut After(case));
+}
+
+/// Compares the unclipped gradients: a step with learning rate 0 and β = 0 leaves them in Adam's first moment.
+fn check_first_gradients(
+    case: &Case,
+    mut nets: PpoNets,
+    batch: &Minibatch,
+    config: &PpoConfig,
+    score: Option<&ScoreConfig>,
+) {
+    let mut adam = Adam::new(AdamConfig { beta1: 0.0, beta2: 0.0, ..AdamConfig::default() });
+    let config = PpoConfig { max_grad_norm: 1e30, ..config.clone() };
+    gradient_step(&mut nets, &mut adam, batch, &config, score, 0.0).expect("finite");
+    check_gradients(case, "step1_grad.", ("", ""), &mut nets, &adam);
 }
 
 /// Compares the gradients that a step with learning rate 0 and β = 0 left in Adam's first moment. Names that begin

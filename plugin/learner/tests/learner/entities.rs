@@ -41,7 +41,7 @@ fn learner(entities: EntityKind, slots: usize, seed: u64) -> PpoLearner {
     learner_of(config(entities), slots, seed, DeviceKind::Flex)
 }
 
-/// Things around an agent, who has to step to the side of the nearest one.
+/// A scene with things around an agent. The right action is a step to the side of the nearest thing.
 #[derive(Clone)]
 struct Around(Vec<[f32; WIDTH]>);
 

@@ -61,7 +61,7 @@ impl Table {
         }
     }
 
-    /// Returns the player who has won.
+    /// Returns the number of the player that has won, if one has.
     pub fn winner(&self) -> Option<usize> {
         self.points.iter().position(|&points| points >= POINTS)
     }
