@@ -37,6 +37,9 @@ pub struct CheckpointSummary {
     pub episodic_return: Option<f64>,
     /// Success rate of the last 100 training episodes; `None` before as many have ended.
     pub success_rate: Option<f64>,
+    /// Elo rating of the policy against its rivals, as of this step; `None` without rivals, or if it is no snapshot.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub elo: Option<f64>,
 }
 
 /// One whole checkpoint.
@@ -66,7 +69,7 @@ pub enum CheckpointChoice {
     /// The latest.
     #[default]
     Last,
-    /// The one with the highest return in training.
+    /// The one with the highest return in training; of a training against rivals the one with the highest rating.
     Best,
     /// The one at this step.
     Step(u64),
@@ -210,9 +213,14 @@ fn prune(run: &Path, keep: usize) -> Result<(), RunError> {
     Ok(())
 }
 
-/// Returns the index of the checkpoint with the highest return, the latest of equals.
+/// Returns the index of the checkpoint with the highest rating, or without ratings that with the highest return; the
+/// latest of equals. Against rivals a return says little: the rivals get better, too.
 fn best(all: &[Checkpoint]) -> Option<usize> {
-    let value = |index: &usize| all[*index].summary.episodic_return.unwrap_or(f64::NEG_INFINITY);
+    let is_rated = all.iter().any(|checkpoint| checkpoint.summary.elo.is_some());
+    let value = |index: &usize| {
+        let CheckpointSummary { elo, episodic_return, .. } = all[*index].summary;
+        if is_rated { elo } else { episodic_return }.unwrap_or(f64::NEG_INFINITY)
+    };
     (0..all.len()).max_by(|a, b| value(a).total_cmp(&value(b)))
 }
 
@@ -233,12 +241,26 @@ mod tests {
     use playbot_harness::sealed_file::write_atomically;
 
     fn save(run: &Path, step: u64, episodic_return: f64, keep: usize) -> Result<(), RunError> {
-        let summary = CheckpointSummary { step, episodic_return: Some(episodic_return), success_rate: None };
+        let summary =
+            CheckpointSummary { step, episodic_return: Some(episodic_return), ..CheckpointSummary::default() };
         write(run, summary, keep, |checkpoint| Ok(write_atomically(&checkpoint.learner_file(), b"weights")?))
     }
 
     fn steps(run: &Path) -> Vec<u64> {
         list(run).expect("readable").iter().map(|checkpoint| checkpoint.summary.step).collect()
+    }
+
+    #[test]
+    fn the_best_against_rivals_is_the_highest_rated() {
+        let run = tempfile::tempdir().expect("a folder");
+        let values = [(10, 0.9, Some(1000.0)), (20, 0.1, Some(1300.0)), (25, 0.9, None), (30, 0.2, Some(1200.0))];
+        for (step, value, elo) in values {
+            let summary = CheckpointSummary { step, episodic_return: Some(value), elo, ..CheckpointSummary::default() };
+            let filled = |checkpoint: &Checkpoint| Ok(write_atomically(&checkpoint.learner_file(), b"weights")?);
+            write(run.path(), summary, 1, filled).expect("writable");
+        }
+        assert_eq!(steps(run.path()), [20, 30]);
+        assert_eq!(choose(run.path(), CheckpointChoice::Best).expect("there").summary.step, 20);
     }
 
     #[test]

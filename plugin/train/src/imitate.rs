@@ -469,7 +469,8 @@ impl<'a> Imitation<'a> {
         self.run.metrics_log().sync()?;
         let ImitationProgress { steps: step, best, .. } = self.progress;
         let episodic_return = best.map(|best| best.episodic_return);
-        let summary = CheckpointSummary { step, episodic_return, success_rate: best.map(|best| best.success) };
+        let summary =
+            CheckpointSummary { step, episodic_return, success_rate: best.map(|best| best.success), elo: None };
         let keep = self.experiment.checkpoints.keep;
         let (learner, best, progress) = (&self.learner, &self.best, &self.progress);
         checkpoint::write(self.run.path(), summary, keep, |fresh| {

@@ -235,7 +235,7 @@ impl RunDir {
     pub fn save(&self, trainer: &mut Trainer) -> Result<(), RunError> {
         self.metrics_log().sync()?;
         let keep = trainer.experiment().checkpoints.keep;
-        checkpoint::write(&self.path, trainer.progress.summary(), keep, |fresh| {
+        checkpoint::write(&self.path, trainer.summary(), keep, |fresh| {
             trainer.learner.save(&fresh.learner_file())?;
             let (progress, levels) = (trainer.progress.clone(), trainer.level_state());
             let (arenas, self_play) = (trainer.save_arenas(), trainer.self_play_state());

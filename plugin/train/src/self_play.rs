@@ -222,6 +222,17 @@ impl SelfPlay {
         Ok(())
     }
 
+    /// Returns the steps at which the newest snapshot was taken.
+    pub(crate) fn newest_step(&self) -> Option<u64> {
+        self.state.steps.last().copied()
+    }
+
+    /// Returns the rating of the newest snapshot, if it was taken at this step and has played a match.
+    pub(crate) fn rating_at(&self, step: u64) -> Option<f64> {
+        let newest = self.ladder().members.into_iter().rfind(|member| member.step.is_some())?;
+        newest.rating.filter(|_| newest.step == Some(step)).map(|rating| rating.elo)
+    }
+
     /// Returns the table of all rivals by their ratings.
     pub(crate) fn ladder(&self) -> Ladder {
         let bots: Vec<String> = self.bots.iter().map(|(name, _)| name.clone()).collect();

@@ -247,7 +247,8 @@ impl Training {
             let report = trainer.update().map_err(|error| stopped_by(run, error))?;
             run.log(&report, steps_per_update).map_err(TrainingError::from)?;
             observer.observe(RunEvent::Updated { report: &report, steps_per_update });
-            if report.update.is_multiple_of(every) {
+            // The best of a training against rivals is a snapshot, so each of these is saved.
+            if report.update.is_multiple_of(every) || trainer.is_snapshot() {
                 save(run, trainer, observer)?;
                 saved = report.update;
             }

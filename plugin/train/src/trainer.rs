@@ -594,6 +594,7 @@ impl Progress {
             step: self.steps,
             episodic_return: settled(self.episodic_return()),
             success_rate: settled(self.success_rate()),
+            elo: None,
         }
     }
 

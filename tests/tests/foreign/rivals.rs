@@ -23,14 +23,16 @@ use playbot_harness::{
     worlds::build_world,
 };
 use playbot_learner::{DeviceKind, Policy, PpoConfig};
-use playbot_tests::training::{check_resuming, train, untrained};
+use playbot_tests::training::{check_resuming, run_info, train, untrained};
 use playbot_train::{
     Trainer,
-    checkpoint::CheckpointChoice,
+    checkpoint::{self, CheckpointChoice},
     experiment::file::{parse_experiment, read_experiment},
     policy_export::{Provenance, export_policy, policy_file},
     run_dir::RunDir,
+    run_observer::Unobserved,
     self_play::ladder::Ladder,
+    train_run::Training,
 };
 
 /// The folder of the game.
@@ -178,7 +180,7 @@ fn matches_have_the_same_results_on_any_number_of_threads_and_both_sides_share_t
     let alone = play(&one, &other, 1);
     assert_eq!(alone.len(), 8, "four levels on two seats");
     assert_eq!(alone, play(&one, &other, 3));
-    // Matches between bots are the same from both seats, whoever is called the player.
+    // A match between two bots is the same whichever of them counts as the player.
     let (a, b) = (follower(), Player::Blind(BlindBot::Constant(ActionValue::Discrete(1))));
     let (forth, back) = (play(&a, &b, 1), play(&b, &a, 1));
     for level in 0..4 {
@@ -257,6 +259,27 @@ fn snapshots_join_the_ladder_and_the_checkpoint_keeps_those_that_play() {
     for tag in ["self_play/elo\"", "self_play/win_rate\"", "self_play/snapshots\":4.0"] {
         assert!(last.contains(tag), "{tag}: {last}");
     }
+}
+
+#[test]
+fn each_snapshot_is_a_checkpoint_and_the_best_has_the_highest_rating() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("run");
+    let experiment = experiment().with_set(&["checkpoints.every=1000", "checkpoints.keep=9"]).expect("valid");
+    let run = RunDir::create(&path, &experiment, &run_info(&experiment), false).expect("fresh");
+    let trainer = Trainer::new(&pong(), &experiment, None, DeviceKind::Flex, 1).expect("it fits");
+    let mut training = Training { run, trainer, started: None };
+    assert!(training.drive(&mut Unobserved).expect("it learns"));
+    let saved = checkpoint::list(&path).expect("readable");
+    let rated: Vec<(u64, f64)> = saved.iter().filter_map(|it| Some((it.summary.step, it.summary.elo?))).collect();
+    let steps: Vec<u64> = rated.iter().map(|(step, _)| *step).collect();
+    assert_eq!(steps, [512, 1024, 1536]);
+    let ladder = training.trainer.ladder().expect("it has one");
+    let newest = ladder.members.last().and_then(|member| member.rating).expect("rated");
+    assert_eq!(rated[2].1, newest.elo);
+    let best = training.run.checkpoint(CheckpointChoice::Best).expect("saved").summary;
+    let highest = rated.iter().map(|(_, elo)| *elo).fold(f64::NEG_INFINITY, f64::max);
+    assert_eq!(best.elo, Some(highest));
 }
 
 #[test]

@@ -227,7 +227,7 @@ mod tests {
     #[test]
     fn it_is_said_which_checkpoint_is_the_best() {
         let checkpoint = |episodic_return| {
-            let summary = CheckpointSummary { step: 81_920, episodic_return, success_rate: None };
+            let summary = CheckpointSummary { step: 81_920, episodic_return, ..CheckpointSummary::default() };
             Checkpoint { path: "runs/a/checkpoints/step-000000081920".into(), summary }
         };
         let words = "the best checkpoint of runs/a is that of step 81,920, with a return of 5.25 in training";

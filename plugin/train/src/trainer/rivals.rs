@@ -1,6 +1,7 @@
 //! Rivals of a trainer: their renewal between rollouts, their ratings, and their part of checkpoints.
 
 use crate::{
+    checkpoint::CheckpointSummary,
     collect::{Collector, RestoreError},
     error::TrainError,
     rival_seats::ArenaRivals,
@@ -49,6 +50,17 @@ impl Trainer {
     /// Returns the training against rivals, if it is one.
     pub(crate) fn self_play(&self) -> Option<&SelfPlay> {
         self.self_play.as_ref()
+    }
+
+    /// Returns the training results of a checkpoint of this moment.
+    pub(crate) fn summary(&self) -> CheckpointSummary {
+        let elo = self.self_play.as_ref().and_then(|it| it.rating_at(self.steps()));
+        CheckpointSummary { elo, ..self.progress.summary() }
+    }
+
+    /// Returns whether the policy of this moment is a snapshot that rivals play.
+    pub(crate) fn is_snapshot(&self) -> bool {
+        self.self_play.as_ref().is_some_and(|it| it.newest_step() == Some(self.steps()))
     }
 
     /// Returns the rivals by their ratings; `None` in a training without rivals.

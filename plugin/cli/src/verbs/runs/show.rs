@@ -168,6 +168,9 @@ fn describe_ancestor(ancestor: &Ancestor, first: bool) -> String {
 
 /// Describes the rating of a checkpoint in training. Before the 100th episode has ended only the log has it.
 fn rating(summary: &CheckpointSummary, curves: &RunCurves) -> String {
+    if let Some(elo) = summary.elo {
+        return format!("rating {elo:.0}");
+    }
     if let Some(value) = summary.episodic_return {
         return format!("return {value:.2}");
     }
@@ -275,8 +278,9 @@ mod tests {
         let lines = "{\"step\":8,\"charts/episodic_return\":null}\n{\"step\":16,\"charts/episodic_return\":5.302}\n";
         std::fs::write(folder.path().join("metrics.jsonl"), lines).expect("writable");
         let curves = RunCurves::read(folder.path()).expect("readable");
-        let rated =
-            |step, episodic_return| rating(&CheckpointSummary { step, episodic_return, success_rate: None }, &curves);
+        let rated = |step, episodic_return| {
+            rating(&CheckpointSummary { step, episodic_return, ..CheckpointSummary::default() }, &curves)
+        };
         let found = [rated(0, None), rated(8, None), rated(16, None), rated(16, Some(7.0))];
         let few = "return 5.30, of fewer than 100 episodes";
         assert_eq!(found, ["no episode yet", "no episode yet", few, "return 7.00"]);
