@@ -129,6 +129,9 @@ pub fn legal_uniform(space: &ActionSpace, legal: Option<&LegalActions>, rng: &mu
         });
         return ActionValue::Mixed { choices: drawn.collect(), numbers: uniform_numbers(*numbers, rng) };
     }
+    if let ActionSpace::Continuous(numbers) = space {
+        return ActionValue::Continuous(uniform_numbers(*numbers, rng));
+    }
     // A mask without a legal action is a fault of this tick, so the action does not matter.
     let number = rng.random_range(0..legal.count().max(1) as u32);
     legal.pick(number).unwrap_or(ActionValue::Discrete(0))

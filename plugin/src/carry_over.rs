@@ -241,6 +241,7 @@ mod tests {
                 "BlindBot",
                 "Control",
                 "Decision",
+                "DecisionPeriod",
                 "EntitySensor",
                 "EpisodeCount",
                 "EpisodeSeeds",

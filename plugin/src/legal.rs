@@ -1,4 +1,4 @@
-//! Action masks: the discrete actions that are legal in a tick.
+//! Action masks: the actions that are legal in a tick; and decisions that hold for several.
 //!
 //! A game keeps the [`LegalActions`] of its agents up to date in [`ObserveSchedule`](crate::systems::ObserveSchedule).
 //! Random bots, the noise of demonstrators and explorers then draw among legal actions. Policies give illegal actions
@@ -6,6 +6,9 @@
 //! the game's [`IdleAction`], or the lowest legal action if that is illegal too. Of several choices at once, an illegal
 //! one becomes its lowest legal option. A person may press anything, so the game
 //! has to ignore illegal actions. A replay plays what was recorded.
+//!
+//! A [`DecisionPeriod`] lets an agent decide in every so many ticks: in between, what it decided is the only legal action,
+//! numbers included.
 //!
 //! ```
 //! use bevy::prelude::*;
@@ -31,13 +34,15 @@ use bevy::prelude::*;
 /// The legal actions of an agent in this tick. An agent without it may take any action.
 ///
 /// Each discrete action has an entry. Of several choices at once, each option of each choice has one. At least one must
-/// be legal in each choice, in each tick. Numbers have no mask.
-#[derive(Component, Clone, Debug, Default, PartialEq, Eq, Reflect)]
+/// be legal in each choice, in each tick. Numbers have no entries: either the agent chooses all of them, or none.
+#[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
 #[reflect(Component, CarryComponent, Clone, Debug, Default, PartialEq)]
 pub struct LegalActions {
     mask: Vec<bool>,
     /// The number of entries of each choice.
     sizes: Vec<usize>,
+    /// The only legal numbers, if the agent cannot choose them.
+    numbers: Option<Vec<f32>>,
 }
 
 impl LegalActions {
@@ -72,14 +77,48 @@ impl LegalActions {
         let mask: Vec<bool> = mask.into_iter().collect();
         let sizes: Vec<usize> = space.choices().sizes().iter().map(|&size| size as usize).collect();
         match sizes.iter().sum::<usize>() == mask.len() {
-            true => Self { mask, sizes },
+            true => Self { mask, sizes, numbers: None },
             false => Self::new(mask),
         }
+    }
+
+    /// Creates the mask that allows this action of `space` alone.
+    ///
+    /// ```
+    /// use bevy_playbot::{legal::LegalActions, prelude::*};
+    ///
+    /// let steer = |angle| ActionValue::Continuous(vec![angle]);
+    /// let legal = LegalActions::only(&ActionSpace::Continuous(1), &steer(0.5));
+    /// assert!(legal.allows(&steer(0.5)) && !legal.allows(&steer(0.2)));
+    /// ```
+    pub fn only(space: &ActionSpace, action: &ActionValue) -> Self {
+        let taken = |choice: usize| match action {
+            ActionValue::Discrete(option) => Some(*option),
+            ActionValue::Continuous(_) => None,
+            ActionValue::Mixed { choices, .. } => choices.get(choice).copied(),
+        };
+        let sizes = space.choices();
+        let choices = sizes.sizes().iter().enumerate();
+        let one = choices.map(|(choice, &size)| (0..size).map(move |option| taken(choice) == Some(option)));
+        let numbers = match action {
+            ActionValue::Discrete(_) => None,
+            ActionValue::Continuous(numbers) | ActionValue::Mixed { numbers, .. } => {
+                (space.numbers() > 0).then(|| numbers.clone())
+            }
+        };
+        Self { numbers, ..Self::of_choices(one) }
     }
 
     /// Returns the entries, choice after choice.
     pub fn mask(&self) -> &[bool] {
         &self.mask
+    }
+
+    /// Returns the entries as learners read them, `space.mask_width()` of them: in a space with numbers the last one is
+    /// true if the agent chooses the numbers.
+    pub fn entries(&self, space: &ActionSpace) -> impl Iterator<Item = bool> {
+        let of_numbers = (space.numbers() > 0).then_some(self.numbers.is_none());
+        self.mask.iter().copied().chain(of_numbers)
     }
 
     /// Returns the entries of one choice; none if there is no such choice.
@@ -94,15 +133,30 @@ impl LegalActions {
         options.filter_map(|(option, &is_legal)| is_legal.then_some(option)).collect()
     }
 
-    /// Returns whether an action is legal. Numbers always are.
+    /// Returns whether an action is legal.
     pub fn allows(&self, action: &ActionValue) -> bool {
         let allows = |choice, option: u32| self.of_choice(choice).get(option as usize).copied().unwrap_or(false);
         match action {
             ActionValue::Discrete(index) => allows(0, *index),
-            ActionValue::Continuous(_) => true,
-            ActionValue::Mixed { choices, .. } => {
-                choices.iter().enumerate().all(|(choice, &option)| allows(choice, option))
+            ActionValue::Continuous(numbers) => self.allows_numbers(numbers),
+            ActionValue::Mixed { choices, numbers } => {
+                self.allows_numbers(numbers)
+                    && choices.iter().enumerate().all(|(choice, &option)| allows(choice, option))
             }
+        }
+    }
+
+    /// Returns whether these numbers are legal.
+    pub fn allows_numbers(&self, numbers: &[f32]) -> bool {
+        self.numbers.as_deref().is_none_or(|only| only == numbers)
+    }
+
+    /// Replaces the numbers of an action by the only legal ones, if the agent cannot choose them.
+    pub fn set_numbers(&self, action: &mut ActionValue) {
+        if let (Some(only), ActionValue::Continuous(numbers) | ActionValue::Mixed { numbers, .. }) =
+            (&self.numbers, action)
+        {
+            numbers.clone_from(only);
         }
     }
 
@@ -141,8 +195,12 @@ impl LegalActions {
     fn misfit(&self, space: &ActionSpace) -> Option<String> {
         let choices = space.choices();
         let sizes = choices.sizes().iter().map(|&size| size as usize);
-        if choices.sizes().is_empty() {
-            return Some("it has `LegalActions` and continuous actions: a mask is for discrete ones".to_owned());
+        if choices.sizes().is_empty() && !self.mask.is_empty() {
+            let text = "its `LegalActions` have entries, and it has continuous actions: entries are for discrete ones";
+            return Some(text.to_owned());
+        }
+        if let Some(numbers) = self.numbers.as_ref().filter(|numbers| numbers.len() != space.numbers()) {
+            return Some(format!("its `LegalActions` allow {} numbers alone, and it has {space}", numbers.len()));
         }
         if !sizes.eq(self.sizes.iter().copied()) {
             let entries = match &self.sizes[..] {
@@ -173,16 +231,104 @@ pub struct RedrawsIllegal {
     pub random: u32,
 }
 
-/// Reports masks that do not fit their agents, with agent and tick, and stops those agents.
+/// Lets an agent decide in every so many ticks of its episode, the first one included. In between, what it decided is its
+/// only [legal](LegalActions) action: bots, explorers and policies repeat it, and learners learn from the decisions alone.
+/// Observations, rewards, recordings, time limits and skill intervals count ticks, as ever. People may press something
+/// else.
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_playbot::{legal::DecisionPeriod, prelude::*};
+///
+/// let mut app = headless_app();
+/// let agent = (Agent::new(0, ActionSpace::Continuous(1)), DecisionPeriod::new(4), Control::Bot, BlindBot::Uniform);
+/// let agent = app.world_mut().spawn(agent).id();
+/// let mut steered = Vec::new();
+/// for _ in 0..8 {
+///     app.ticks(1).expect("it acts");
+///     steered.push(app.world().get::<Action>(agent).expect("an agent").0.clone());
+/// }
+/// assert_eq!((&steered[0], &steered[4]), (&steered[3], &steered[7]));
+/// assert_ne!(steered[3], steered[4]);
+/// ```
+#[derive(Component, Clone, Debug, PartialEq, Reflect)]
+#[reflect(Component, CarryComponent, Clone, Debug, PartialEq)]
+pub struct DecisionPeriod {
+    ticks: u32,
+    /// The last decision.
+    decided: Option<Action>,
+    /// What the game itself allows in a tick in which the decision holds.
+    game: Option<LegalActions>,
+}
+
+impl DecisionPeriod {
+    /// Creates the period: 1 for a decision in each tick. 0 is a fault.
+    pub fn new(ticks: u32) -> Self {
+        Self { ticks, decided: None, game: None }
+    }
+
+    /// Returns the ticks of a decision.
+    pub fn ticks(&self) -> u32 {
+        self.ticks
+    }
+
+    /// Returns whether the agent decides in this tick of an episode, counted from 0.
+    pub fn decides_in(&self, tick: u32) -> bool {
+        self.ticks < 2 || tick.is_multiple_of(self.ticks)
+    }
+}
+
+/// Gives the game its own masks back, to be kept up to date.
+pub(crate) fn return_masks(mut agents: Query<(&mut DecisionPeriod, &mut LegalActions)>) {
+    for (mut period, mut legal) in &mut agents {
+        if let Some(game) = period.game.take() {
+            *legal = game;
+        }
+    }
+}
+
+/// Allows the last decision alone, in the ticks in which it holds.
+pub(crate) fn hold_decisions(
+    mut agents: Query<(Entity, &Agent, &Episode, &mut DecisionPeriod, Option<&mut LegalActions>)>,
+    mut commands: Commands,
+) {
+    for (entity, agent, episode, mut period, legal) in &mut agents {
+        let is_held = episode.is_running() && !period.decides_in(episode.tick);
+        let Some(decided) = period.decided.as_ref().filter(|_| is_held) else { continue };
+        let only = LegalActions::only(&agent.actions, &decided.0);
+        match legal {
+            Some(mut legal) => period.game = Some(std::mem::replace(&mut legal, only)),
+            None => {
+                let choices = agent.actions.choices();
+                let all = choices.sizes().iter().map(|&size| std::iter::repeat_n(true, size as usize));
+                period.game = Some(LegalActions::of_choices(all));
+                commands.entity(entity).insert(only);
+            }
+        }
+    }
+}
+
+/// Notes the actions of the ticks in which agents decide.
+pub(crate) fn note_decisions(mut agents: Query<(&Action, &Episode, &mut DecisionPeriod)>) {
+    for (action, episode, mut period) in &mut agents {
+        if episode.is_running() && period.ticks > 1 && period.decides_in(episode.tick) {
+            period.decided = Some(action.clone());
+        }
+    }
+}
+
+/// Reports masks and periods that do not fit their agents, with agent and tick, and stops those agents.
 pub(crate) fn check_legal_actions(
-    mut agents: Query<(&Agent, &LegalActions, &Episode, &mut Control)>,
+    mut agents: Query<(&Agent, Option<&LegalActions>, Option<&DecisionPeriod>, &Episode, &mut Control)>,
     mut faults: ResMut<Faults>,
 ) {
-    for (agent, legal, episode, mut control) in &mut agents {
+    for (agent, legal, period, episode, mut control) in &mut agents {
         if !control.is_active() || !episode.is_running() {
             continue;
         }
-        if let Some(why) = legal.misfit(&agent.actions) {
+        let no_ticks = || "its `DecisionPeriod` has 0 ticks: a decision holds for at least 1".to_owned();
+        let wrong = period.filter(|period| period.ticks == 0).map(|_| no_ticks());
+        if let Some(why) = wrong.or_else(|| legal?.misfit(&agent.actions)) {
             faults.report(format!("{}: {why}", episode.moment(agent)));
             *control = Control::Idle;
         }
@@ -201,6 +347,10 @@ pub(crate) fn keep_legal(
             .any(|(choice, option)| option as usize >= legal.sizes.get(choice).copied().unwrap_or_default());
         let is_bot = *control == Control::Bot || (*control == Control::Replay && redraw.is_some());
         if !is_bot || !episode.is_running() || is_outside || legal.allows(&action.0) {
+            continue;
+        }
+        legal.set_numbers(&mut action.0);
+        if legal.allows(&action.0) {
             continue;
         }
         let random = redraw.map(|RedrawsIllegal { random }| *random);

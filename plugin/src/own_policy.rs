@@ -63,7 +63,13 @@ pub(crate) fn run_own_policies(
         }
         let width = own.policy.memory();
         batch.start(&own.policy.observation());
-        batch.push(entity, observation, legal, &skill, own.skills.as_ref().map(|skills| skills.skill_interval));
+        batch.push(
+            (entity, agent),
+            observation,
+            legal,
+            &skill,
+            own.skills.as_ref().map(|skills| skills.skill_interval),
+        );
         batch.push_memory(&memory.0, width);
         let output = match batch.decide(&own.policy, None) {
             Ok(output) => output,

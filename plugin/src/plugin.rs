@@ -106,7 +106,14 @@ fn add_decision_systems(app: &mut App, schedule: impl ScheduleLabel) {
             )
                 .chain()
                 .in_set(PlaybotSystems::Begin),
-            (run_observe_schedule, observation::check_observations, vision::check_images, legal::check_legal_actions)
+            (
+                legal::return_masks,
+                run_observe_schedule,
+                legal::hold_decisions,
+                observation::check_observations,
+                vision::check_images,
+                legal::check_legal_actions,
+            )
                 .chain()
                 .in_set(PlaybotSystems::Observe),
             (
@@ -124,7 +131,9 @@ fn add_decision_systems(app: &mut App, schedule: impl ScheduleLabel) {
                 .before(PlaybotSystems::Act)
                 .run_if(placement::is_tick)
                 .ambiguous_with_all(),
-            action::check_actions.in_set(PlaybotSystems::Act),
+            (action::check_actions, legal::note_decisions.run_if(any_with_component::<legal::DecisionPeriod>))
+                .chain()
+                .in_set(PlaybotSystems::Act),
         ),
     );
 }

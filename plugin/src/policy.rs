@@ -144,7 +144,7 @@ pub(crate) fn run_policy(
                 agent.index
             ));
         };
-        batch.push(entity, observation, legal, skill, skill_interval);
+        batch.push((entity, agent), observation, legal, skill, skill_interval);
         batch.push_memory(memory, width);
     }
     if batch.agents().is_empty() {
@@ -155,7 +155,9 @@ pub(crate) fn run_policy(
         Err(error) => return faults.report(format!("the policy cannot decide: {error}")),
     };
     for (row, &entity) in batch.agents().iter().enumerate() {
-        let Ok((.., (_, memory), mut streams, mut action, mut decision)) = agents.get_mut(entity) else { continue };
+        let Ok((.., (_, _, legal), (_, memory), mut streams, mut action, mut decision)) = agents.get_mut(entity) else {
+            continue;
+        };
         let (chosen, log_prob) = match active.draw {
             ActionDraw::Sample => output.sample(row, &mut streams.action),
             ActionDraw::Greedy => {
@@ -169,6 +171,9 @@ pub(crate) fn run_policy(
             memory.0.extend_from_slice(&output.memory[row * width..(row + 1) * width]);
         }
         action.0 = chosen;
+        if let Some(legal) = legal {
+            legal.set_numbers(&mut action.0);
+        }
         *decision = Decision { log_prob, value: output.values[row] };
     }
 }

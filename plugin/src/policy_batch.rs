@@ -4,6 +4,7 @@
 mod shared_batch_tests;
 
 use crate::{
+    agent::Agent,
     legal::LegalActions,
     observation::{Observation, start_batch},
     skill_prior::ActiveSkill,
@@ -64,17 +65,18 @@ impl PolicyBatch {
     /// Adds an agent with its observation, its mask, and its skill, which is drawn anew every `skill_interval` ticks.
     pub(crate) fn push(
         &mut self,
-        agent: Entity,
+        (entity, agent): (Entity, &Agent),
         observation: &Observation,
         legal: Option<&LegalActions>,
         skill: &ActiveSkill,
         skill_interval: Option<u32>,
     ) {
-        self.agents.push(agent);
+        self.agents.push(entity);
         observation.push_to(&mut self.rows.observations);
         self.rows.skills.extend_from_slice(&skill.z);
         self.rows.left.extend(skill_interval.map(|skill_interval| skill.left(skill_interval)));
-        self.rows.push_legal(legal.map_or(&[], LegalActions::mask), 1);
+        let mask: Vec<bool> = legal.into_iter().flat_map(|legal| legal.entries(&agent.actions)).collect();
+        self.rows.push_legal(&mask, 1);
         self.rows.count += 1;
     }
 

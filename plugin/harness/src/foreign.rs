@@ -94,7 +94,7 @@ use bevy_playbot::{
     agent::Agent,
     engine::{Renewal, has_no_actions, tasks_in_order},
     headless::{HeadlessPlugins, set_frame_rate},
-    legal::LegalActions,
+    legal::{DecisionPeriod, LegalActions},
     observation::{ObservationSpace, VectorSensor},
     placement::TickPlacement,
     virtual_input::{ActionAxis, VirtualInput},
@@ -588,8 +588,11 @@ impl Game for ForeignGame {
             agent.insert(input);
         }
         let space = self.actions();
-        if (self.description.legal.is_some() || self.description.input.holds()) && space.options() > 0 {
+        if self.description.legal.is_some() && space.options() > 0 {
             agent.insert(LegalActions::of_space(&space, std::iter::repeat_n(true, space.options())));
+        }
+        if self.description.input.holds() {
+            agent.insert(DecisionPeriod::new(self.description.input.every.unwrap_or(1)));
         }
         #[cfg(feature = "ui")]
         clicks::equip(&mut agent, self);

@@ -64,11 +64,22 @@ use crate::{
     prelude::*,
 };
 use bevy::prelude::*;
-use bevy_playbot::{engine::panics::EpisodeTrace, streams::AgentStreams};
+use bevy_playbot::{
+    engine::panics::EpisodeTrace,
+    legal::{DecisionPeriod, LegalActions},
+    streams::AgentStreams,
+};
 
 /// What the plugin keeps of an agent that plays.
-#[derive(Bundle, Clone)]
+#[derive(Clone)]
 pub(crate) struct AgentState {
+    parts: AgentParts,
+    /// The decision that holds, and the mask.
+    decisions: Option<(DecisionPeriod, Option<LegalActions>)>,
+}
+
+#[derive(Bundle, Clone)]
+struct AgentParts {
     episode: Episode,
     streams: AgentStreams,
     hash: StateHash,
@@ -81,21 +92,34 @@ impl AgentState {
     /// Returns a copy of what the plugin keeps of an agent; `None` if this is none.
     pub(crate) fn of(world: &World, agent: Entity) -> Option<Self> {
         let agent = world.get_entity(agent).ok()?;
-        Some(Self {
+        let parts = AgentParts {
             episode: agent.get::<Episode>()?.clone(),
             streams: agent.get::<AgentStreams>()?.clone(),
             hash: *agent.get::<StateHash>()?,
             observation: agent.get::<Observation>()?.clone(),
             action: agent.get::<Action>()?.clone(),
             reward: *agent.get::<Reward>()?,
-        })
+        };
+        let period = agent.get::<DecisionPeriod>().cloned();
+        Some(Self { parts, decisions: period.map(|period| (period, agent.get::<LegalActions>().cloned())) })
+    }
+
+    /// Gives all of it back to an agent.
+    pub(crate) fn put(&self, agent: &mut EntityWorldMut<'_>) {
+        agent.insert(self.parts.clone());
+        let Some((period, legal)) = &self.decisions else { return };
+        agent.insert(period.clone());
+        match legal {
+            Some(legal) => agent.insert(legal.clone()),
+            None => agent.remove::<LegalActions>(),
+        };
     }
 }
 
 /// An agent's running episode at the end of a tick. Other agents of the game may go on from it, also in other Worlds.
 ///
 /// It has the state of the game, by [`SnapshotTools`](crate::game::SnapshotTools), and what the plugin keeps of an
-/// agent: episode, random streams, state hash, observation, action and reward. Stacks of pictures, skills, recordings
+/// agent: episode, random streams, state hash, observation, action, reward, and the decision that holds. Stacks of pictures, skills, recordings
 /// and the states of bots are no part of it.
 pub struct SavedEpisode {
     game: Snapshot,
@@ -124,7 +148,7 @@ impl SavedEpisode {
 
     /// Returns the ticks of the episode so far.
     pub fn tick(&self) -> u32 {
-        self.state.episode.tick
+        self.state.parts.episode.tick
     }
 
     /// Puts an agent into the episode, whatever it plays now. Its control and its next levels stay as they
@@ -132,12 +156,13 @@ impl SavedEpisode {
     /// game cannot load its state.
     pub fn restore(&self, game: &dyn Game, world: &mut World, agent: Entity) -> bool {
         let played = world.get::<Episode>(agent);
-        let is_same = played.is_some_and(|played| played.level == self.state.episode.level && !played.is_loading());
+        let is_same =
+            played.is_some_and(|played| played.level == self.state.parts.episode.level && !played.is_loading());
         if !is_same || !game.tools().snapshots.load(world, agent, &self.game) {
             return false;
         }
         let Ok(mut agent) = world.get_entity_mut(agent) else { return false };
-        agent.insert(self.state.clone());
+        self.state.put(&mut agent);
         if let Some(trace) = &self.trace {
             agent.insert(trace.clone());
         }

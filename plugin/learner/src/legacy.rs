@@ -96,6 +96,7 @@ mod tests {
             space: ActionSpace::Continuous(2),
             head: vec![0.0, 1.0],
             log_std: Some(vec![0.0, std::f32::consts::LN_2]),
+            held: Vec::new(),
         };
         let action = Actions::Continuous { dim: 2, values: vec![1.0, 1.0] };
         // φ(1) + φ(0) / 2

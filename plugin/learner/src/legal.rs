@@ -1,10 +1,14 @@
-//! Masks of discrete actions in learning: illegal options have probability 0.
+//! Masks of actions in learning: illegal options have probability 0, and numbers that are held count for nothing.
 //!
 //! A mask has an entry for each option of each choice of each state, row by row: true if the option is legal. A discrete
-//! action is one choice. An empty mask allows everything and costs nothing. A choice without any legal option counts as
-//! one in which all are legal: no action is taken there.
+//! action is one choice. In a space with numbers each row has one entry more: false if the numbers are those of an
+//! earlier tick, which the game holds. An empty mask allows everything and costs nothing. A choice without any legal
+//! option counts as one in which all are legal: no action is taken there.
 
-use crate::{ActionSpace, Actions, LearnError, nn::matrix};
+use crate::{
+    ActionSpace, Actions, LearnError,
+    nn::{matrix, vector},
+};
 use burn::tensor::{Device, Tensor};
 
 /// The logit of an illegal choice. Unlike -∞ it makes no NaN in a product with its probability, which is 0.
@@ -18,8 +22,8 @@ fn is_mixed(legal: &[bool]) -> bool {
 /// Removes the illegal options from normalised log-probabilities, `[n, dim]`: the legal ones of a choice share its
 /// probability. Choices without illegal options keep their bits, and so do the means of a vector behind the options.
 pub(crate) fn restrict(head: &mut [f32], space: &ActionSpace, legal: &[bool]) {
-    let (dim, options, choices) = (space.dim().max(1), space.options().max(1), space.choices());
-    for (row, legal) in head.chunks_exact_mut(dim).zip(legal.chunks_exact(options)) {
+    let (dim, width, choices) = (space.dim().max(1), space.mask_width().max(1), space.choices());
+    for (row, legal) in head.chunks_exact_mut(dim).zip(legal.chunks_exact(width)) {
         choices.ranges().for_each(|at| restrict_choice(&mut row[at.clone()], &legal[at]));
     }
 }
@@ -45,19 +49,39 @@ fn restrict_choice(row: &mut [f32], legal: &[bool]) {
 /// Returns the numbers that are added to the logits of these rows, `[rows, options]`: 0 for legal options. `None`
 /// without a mask.
 pub(crate) fn logit_offsets(legal: &[bool], rows: &[usize], space: &ActionSpace, device: &Device) -> Option<Tensor<2>> {
-    if legal.is_empty() {
+    let (options, width, choices) = (space.options(), space.mask_width(), space.choices());
+    if legal.is_empty() || options == 0 {
         return None;
     }
-    let (options, choices) = (space.options(), space.choices());
     let mut offsets = Vec::with_capacity(rows.len() * options);
     for &row in rows {
-        let legal = &legal[row * options..(row + 1) * options];
+        let legal = &legal[row * width..(row + 1) * width];
         for at in choices.ranges() {
             let illegal = if is_mixed(&legal[at.clone()]) { ILLEGAL } else { 0.0 };
             offsets.extend(legal[at].iter().map(|&is_legal| if is_legal { 0.0 } else { illegal }));
         }
     }
     Some(matrix(offsets, rows.len(), options, device))
+}
+
+/// Returns whether the numbers of each row of a mask are held. Empty if none are.
+pub(crate) fn held_rows(legal: &[bool], space: &ActionSpace) -> Vec<bool> {
+    if space.numbers() == 0 {
+        return Vec::new();
+    }
+    let held: Vec<bool> = legal.chunks_exact(space.mask_width()).map(|row| row.last() == Some(&false)).collect();
+    if held.contains(&true) { held } else { Vec::new() }
+}
+
+/// Returns 0 for each of these rows whose numbers are held, and 1 for the others, `[rows]`. `None` if none are.
+pub(crate) fn free_rows(legal: &[bool], rows: &[usize], space: &ActionSpace, device: &Device) -> Option<Tensor<1>> {
+    let width = space.mask_width();
+    if legal.is_empty() || space.numbers() == 0 {
+        return None;
+    }
+    let is_free = |row: &usize| legal[(row + 1) * width - 1];
+    let is_all = rows.iter().all(is_free);
+    (!is_all).then(|| vector(rows.iter().map(|row| f32::from(u8::from(is_free(row)))).collect(), device))
 }
 
 /// Returns the mean over all rows of the largest entropy that the legal options allow, as a share of that of all
@@ -73,19 +97,19 @@ pub(crate) fn entropy_share(legal: &[bool], space: &ActionSpace) -> f64 {
         count => libm::log(count as f64),
     };
     let largest = |legal: &[bool]| choices.ranges().map(|at| of_choice(&legal[at])).sum::<f64>() / of_all;
-    let options = space.options();
-    legal.chunks_exact(options).map(largest).sum::<f64>() / (legal.len() / options) as f64
+    let width = space.mask_width();
+    legal.chunks_exact(width).map(largest).sum::<f64>() / (legal.len() / width) as f64
 }
 
-/// Adds `rows` rows to a mask that may not exist yet: those of `more`, or rows in which everything is legal. `before`
-/// is the number of its rows so far.
-pub(crate) fn extend(mask: &mut Vec<bool>, before: usize, more: &[bool], rows: usize, choices: usize) {
+/// Adds `rows` rows of so many entries to a mask that may not exist yet: those of `more`, or rows in which everything is
+/// legal. `before` is the number of its rows so far.
+pub(crate) fn extend(mask: &mut Vec<bool>, before: usize, more: &[bool], rows: usize, width: usize) {
     if mask.is_empty() && more.is_empty() {
         return;
     }
-    mask.resize(before * choices, true);
+    mask.resize(before * width, true);
     mask.extend_from_slice(more);
-    mask.resize((before + rows) * choices, true);
+    mask.resize((before + rows) * width, true);
 }
 
 /// Checks a mask for `actions`: its length, and that each action is legal.
@@ -96,13 +120,10 @@ pub(crate) fn check(legal: &[bool], space: &ActionSpace, actions: &Actions) -> R
     if legal.is_empty() {
         return Ok(());
     }
-    let (options, choices) = (space.options(), space.choices());
-    if options == 0 {
-        return Err(LearnError::Action(format!("a mask is for discrete actions, not for {space}")));
-    }
+    let (width, choices) = (space.mask_width(), space.choices());
     space.check(actions)?;
-    LearnError::check("rollout legal", actions.len() * options, legal.len())?;
-    for (row, legal) in legal.chunks_exact(options).enumerate() {
+    LearnError::check("rollout legal", actions.len() * width, legal.len())?;
+    for (row, legal) in legal.chunks_exact(width.max(1)).enumerate() {
         for (at, &option) in choices.ranges().zip(actions.chosen(row)) {
             if !legal[at][option as usize] {
                 return Err(LearnError::Action(format!("row {row} is {option}, which its mask forbids")));
@@ -151,6 +172,7 @@ mod tests {
             log_std: Vec::new(),
             values: vec![4.0],
             memory: Vec::new(),
+            held: Vec::new(),
         };
         output.restrict(&[false, false, true]);
         let mut rng = crate::Streams::new(1).stream("draw", 0);
@@ -242,17 +264,33 @@ mod tests {
         let space = ActionSpace::mixed([2, 3], 1);
         let mut head = [0.5f32.ln(), 0.5f32.ln(), 0.5f32.ln(), 0.2f32.ln(), 0.3f32.ln(), 7.0];
         // Nothing is legal of the first choice: it is left alone, as all of it.
-        restrict(&mut head, &space, &[false, false, true, false, true]);
+        restrict(&mut head, &space, &[false, false, true, false, true, true]);
         close(&head[..5].iter().map(|x| x.exp()).collect::<Vec<_>>(), &[0.5, 0.5, 0.625, 0.0, 0.375]);
         assert_eq!(head[5], 7.0, "a number has no mask");
         let actions =
             |options: &[u32]| Actions::Mixed { choices: 2, options: options.to_vec(), dim: 1, values: vec![0.0] };
-        let legal = [true, false, true, true, false];
+        let legal = [true, false, true, true, false, true];
         assert!(check(&legal, &space, &actions(&[0, 1])).is_ok());
         assert!(check(&legal, &space, &actions(&[1, 1])).is_err());
         assert!(check(&legal, &space, &actions(&[0, 2])).is_err());
         // ln 1 + ln 2 of ln 2 + ln 3.
         let share = entropy_share(&legal, &space);
         assert!((share - 2f64.ln() / 6f64.ln()).abs() < 1e-12, "{share}");
+    }
+
+    #[test]
+    fn the_last_entry_of_a_row_says_whether_numbers_are_held() {
+        let space = ActionSpace::mixed([2], 2);
+        let legal = [[true, true, true], [false, true, false], [true, true, true]].concat();
+        assert_eq!(held_rows(&legal, &space), [false, true, false]);
+        assert_eq!(held_rows(&[true; 6], &space), [false; 0]);
+        assert_eq!(held_rows(&legal[..2], &ActionSpace::Discrete(2)), [false; 0]);
+        let device = DeviceKind::Flex.plain();
+        let free = |rows: &[usize]| free_rows(&legal, rows, &space, &device).map(|free| host(free).expect("readable"));
+        assert_eq!((free(&[1, 2]), free(&[2, 0]), free(&[])), (Some(vec![0.0, 1.0]), None, None));
+        let steer = ActionSpace::Continuous(1);
+        let actions = Actions::Continuous { dim: 1, values: vec![0.5, 0.5] };
+        assert!(check(&[true, false], &steer, &actions).is_ok());
+        assert!(check(&[true], &steer, &actions).is_err());
     }
 }

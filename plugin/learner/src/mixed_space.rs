@@ -43,7 +43,7 @@ impl Choices {
         &self.sizes[..self.len]
     }
 
-    /// Returns the number of all options together: the width of a mask.
+    /// Returns the number of all options together.
     pub fn options(&self) -> usize {
         self.sizes().iter().map(|&size| size as usize).sum()
     }

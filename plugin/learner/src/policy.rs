@@ -15,7 +15,7 @@ mod memory;
 use crate::{
     ActionSpace, ActionValue, Choices, EntityBlock, LearnError, MixedSpace, ObsKind, ObsSlice, PolicySpec,
     device::guarded,
-    legal::restrict,
+    legal::{held_rows, restrict},
     nn::{
         CnnKind, HostDist, ImageNet, argmax, categorical_log_prob, frozen, gaussian_log_prob, host, matrix,
         sample_categorical, sample_gaussian, squashed_log_prob, unsquashed_action, vector,
@@ -186,7 +186,7 @@ impl Policy {
             }
         }
         let squashed = self.actor.is_squashed();
-        Ok(PolicyOutput { space, squashed, head, log_std, values, memory: after })
+        Ok(PolicyOutput { space, squashed, head, log_std, values, memory: after, held: Vec::new() })
     }
 
     /// Returns only the values of [`Self::forward`]; zeros if there is no critic.
@@ -325,6 +325,8 @@ pub struct PolicyOutput {
     pub values: Vec<f32>,
     /// What the policy remembers after these observations, `n * memory`; empty without memory.
     pub memory: Vec<f32>,
+    /// True for rows whose numbers are held from an earlier tick, `n`; empty if none are. See [`Self::restrict`].
+    pub held: Vec<bool>,
 }
 
 impl PolicyOutput {
@@ -357,7 +359,7 @@ impl PolicyOutput {
                     let log_prob = squashed_log_prob(head, self.stds(row), &action);
                     return (ActionValue::Continuous(squash(&action)), log_prob);
                 }
-                let log_prob = gaussian_log_prob(head, self.stds(row), &action);
+                let log_prob = self.numbers_log_prob(row, &action);
                 (ActionValue::Continuous(action), log_prob)
             }
             ActionSpace::Mixed(MixedSpace { choices, .. }) => {
@@ -375,7 +377,15 @@ impl PolicyOutput {
         let sum: f32 = of_choices.sum();
         match numbers {
             [] => sum,
-            numbers => sum + gaussian_log_prob(&head[choices.options()..], self.stds(row), numbers),
+            numbers => sum + self.numbers_log_prob(row, numbers),
+        }
+    }
+
+    /// Returns the log-density of the vector of a row; 0 if it is held.
+    fn numbers_log_prob(&self, row: usize, numbers: &[f32]) -> f32 {
+        match self.held.get(row) {
+            Some(true) => 0.0,
+            _ => gaussian_log_prob(&self.head(row)[self.space.options()..], self.stds(row), numbers),
         }
     }
 
@@ -419,7 +429,7 @@ impl PolicyOutput {
                 Ok(squashed_log_prob(self.head(row), self.stds(row), &unsquash(a)))
             }
             (ActionSpace::Continuous(n), ActionValue::Continuous(a)) if a.len() == n => {
-                Ok(gaussian_log_prob(self.head(row), self.stds(row), a))
+                Ok(self.numbers_log_prob(row, a))
             }
             (ActionSpace::Mixed(space), ActionValue::Mixed { choices, numbers })
                 if space.misfit(choices, numbers).is_none() =>
@@ -430,10 +440,12 @@ impl PolicyOutput {
         }
     }
 
-    /// Removes the illegal options of each row, `n * options`, true if legal: the others share their probability.
-    /// Values stay unchanged. An empty mask changes nothing.
+    /// Removes the illegal options of each row, `n * mask_width()`, true if legal: the others share their probability.
+    /// Numbers that are held have the log-density 0, whichever they are: whoever acts replaces drawn ones by those that
+    /// the game holds. Values stay unchanged. An empty mask changes nothing.
     pub fn restrict(&mut self, legal: &[bool]) {
         restrict(&mut self.head, &self.space, legal);
+        self.held = held_rows(legal, &self.space);
     }
 
     /// Splits the outputs into these numbers of rows, in order.
@@ -450,6 +462,7 @@ impl PolicyOutput {
             log_std: self.log_std.drain(..rows * stds).collect(),
             values: self.values.drain(..rows).collect(),
             memory: self.memory.drain(..rows * memory).collect(),
+            held: self.held.drain(..rows.min(self.held.len())).collect(),
         });
         parts.collect()
     }
@@ -457,7 +470,7 @@ impl PolicyOutput {
     /// Returns the distributions alone.
     pub(crate) fn into_dist(self) -> HostDist {
         let log_std = (!self.log_std.is_empty()).then_some(self.log_std);
-        HostDist { space: self.space, head: self.head, log_std }
+        HostDist { space: self.space, head: self.head, log_std, held: self.held }
     }
 
     fn head(&self, row: usize) -> &[f32] {
@@ -492,6 +505,7 @@ mod tests {
             log_std: vec![std.ln()],
             values: vec![0.0],
             memory: Vec::new(),
+            held: Vec::new(),
         }
     }
 
@@ -559,6 +573,7 @@ mod tests {
             values: vec![5.0, 6.0],
             squashed: false,
             memory: Vec::new(),
+            held: Vec::new(),
         };
         let parts = discrete.split(&[1, 1]);
         assert_eq!((&parts[1].head[..], &parts[1].values[..]), (&[3.0, 4.0][..], &[6.0][..]));

@@ -27,7 +27,8 @@ pub struct Rollout {
     pub memory: Vec<f32>,
     /// The actions taken, `T * B`.
     pub actions: Actions,
-    /// True for each discrete action that was legal, `T * B * choices`. Empty if all were, or actions are continuous.
+    /// True for each option that was legal, and in spaces with numbers for numbers that were chosen and not held, `T * B *
+    /// mask_width()`. Empty if everything was.
     pub legal: Vec<bool>,
     /// Their log-probabilities when taken.
     pub log_probs: Vec<f32>,
@@ -306,7 +307,7 @@ impl Rollout {
         self.check()?;
         spec.action_space.check(&self.actions)?;
         legal::check(&self.legal, &spec.action_space, &self.actions)?;
-        self.check_legal_ends(spec.action_space.options())?;
+        self.check_legal_ends(spec.action_space.mask_width())?;
         spec.obs.same_as(&self.obs_kind, "the rollout")?;
         LearnError::check("latent of the rollout", latent, self.latent)?;
         if self.rows() == 0 {
@@ -335,15 +336,15 @@ impl Rollout {
 }
 
 impl Rollout {
-    /// Checks that the masks of the end states have `choices` entries each, if there are any.
-    fn check_legal_ends(&self, choices: usize) -> Result<(), LearnError> {
+    /// Checks that the masks of the end states have `width` entries each, if there are any.
+    fn check_legal_ends(&self, width: usize) -> Result<(), LearnError> {
         let ends = &self.ends;
         for (name, states, legal) in [
             ("rollout ends cut_legal", ends.cut_rows.len(), &ends.cut_legal),
             ("rollout ends next_legal", self.envs, &ends.next_legal),
         ] {
             if !legal.is_empty() {
-                LearnError::check(name, states * choices, legal.len())?;
+                LearnError::check(name, states * width, legal.len())?;
             }
         }
         Ok(())

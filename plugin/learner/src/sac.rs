@@ -28,7 +28,7 @@ use crate::{
     policy::{Policy, StateBatch},
     rng::{ChaCha8Rng, normal, shuffle},
     sac::{
-        buffer::{Demos, ReplayBuffer, Widths},
+        buffer::{Demos, ReplayBuffer, Widths, check_free},
         critics::clock_width,
         metrics::MetricSums,
         steps::explorer,
@@ -103,6 +103,7 @@ impl SacLearner {
         let mut learner = Self::fresh(rlpd.over(config), spec, None, seed, device)?;
         for episode in demos {
             episode.check_for(&spec, 0)?;
+            check_free(episode, &spec.action_space)?;
             check_ends(episode)?;
             if let Some(normalizer) = &mut learner.base.observations {
                 normalizer.update(episode.obs.as_slice().vectors("RLPD")?);
@@ -333,6 +334,7 @@ impl SacLearner {
 
     fn check_rollout(&self, rollout: &Rollout) -> Result<(), LearnError> {
         rollout.check_for(&self.base.spec, self.base.rollout_latent())?;
+        check_free(rollout, &self.base.spec.action_space)?;
         check_ends(rollout)?;
         self.buffer.check_clock(rollout)
     }

@@ -54,7 +54,7 @@ impl ActionSpace {
         }
     }
 
-    /// Returns the options of all choices together: the width of a mask.
+    /// Returns the options of all choices together.
     pub fn options(&self) -> usize {
         match *self {
             Self::Discrete(n) => n,
@@ -70,6 +70,12 @@ impl ActionSpace {
             Self::Continuous(n) => n,
             Self::Mixed(mixed) => mixed.numbers,
         }
+    }
+
+    /// Returns the entries that a mask has for each state: one for each option, and with numbers one more. That last
+    /// one is false where the numbers are no choice of the agent: the game holds those of an earlier tick.
+    pub fn mask_width(&self) -> usize {
+        self.options() + usize::from(self.numbers() > 0)
     }
 
     /// Returns an action of it, for want of another one: the first options, and zeros.

@@ -536,10 +536,10 @@ fn masks(world: &World, agents: impl Iterator<Item = Entity> + Clone) -> Vec<boo
         return all;
     }
     for agent in agents {
-        match (world.get::<LegalActions>(agent), world.get::<Agent>(agent)) {
-            (Some(legal), _) => all.extend_from_slice(legal.mask()),
-            (None, Some(agent)) => all.extend(std::iter::repeat_n(true, agent.actions.options())),
-            (None, None) => {}
+        let Some(Agent { actions, .. }) = world.get(agent) else { continue };
+        match world.get::<LegalActions>(agent) {
+            Some(legal) => all.extend(legal.entries(actions)),
+            None => all.extend(std::iter::repeat_n(true, actions.mask_width())),
         }
     }
     all

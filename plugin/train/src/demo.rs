@@ -218,7 +218,7 @@ impl Demonstrations {
             let start = demo.episode.idle_start();
             leave_out(start, episode, &kind, &space)?;
             if let Some(mask) = mask {
-                mask.drain(..mask.len().min(start * space.dim()));
+                mask.drain(..mask.len().min(start * space.mask_width()));
             }
         }
         let dataset = Dataset::new(kind, space, episodes)?.with_legal(masks)?;
@@ -322,8 +322,8 @@ fn rollout(
     rollout.next_values = vec![0.0];
     rollout.ends.next_obs.push(observations.row(episode.len() - 1, width))?;
     if !legal.is_empty() {
-        let options = space.options();
-        let mask_of = |rows: Range<usize>| legal[rows.start * options..rows.end * options].to_vec();
+        let width = space.mask_width();
+        let mask_of = |rows: Range<usize>| legal[rows.start * width..rows.end * width].to_vec();
         rollout.legal = mask_of(0..steps);
         rollout.ends.next_legal = mask_of(episode.len() - 1..episode.len());
     }

@@ -10,11 +10,13 @@ use bevy_playbot::{
 };
 use playbot::prelude::*;
 use playbot_harness::{demo::verify_file, foreign::ForeignGame, worlds::build_world};
-use playbot_learner::PpoConfig;
+use playbot_learner::{DeviceKind, PpoConfig};
 use playbot_tests::{
     foreign::catch::{Paddle, game},
     training::untrained,
 };
+use playbot_train::{Trainer, experiment::file::parse_experiment};
+use std::path::Path;
 
 /// Returns the position of the paddle after three ticks of this action.
 fn paddle_after(game: &ForeignGame, control: Control, action: ActionValue) -> Vec2 {
@@ -167,16 +169,84 @@ fn a_policy_holds_each_decision_with_certainty() {
     check_held(&actions);
 }
 
+/// Returns a game that is steered by two numbers, each of which holds for four ticks.
+fn steered() -> ForeignGame {
+    fn note(agent: Single<&Action, With<Agent>>, mut last: ResMut<Steered>) {
+        if let ActionValue::Continuous(numbers) = &agent.0 {
+            last.0.clone_from(numbers);
+        }
+    }
+    ForeignGame::new("steered", 1, |app: &mut App| {
+        app.init_resource::<Steered>();
+    })
+    .actions(ActionSpace::Continuous(2), note)
+    .observe(["x"], |last: Res<Steered>| [last.0.first().copied().unwrap_or(0.0)])
+    .demonstrator("swing", |mut ticks: Local<u32>| {
+        *ticks += 1;
+        let angle = (*ticks % 7) as f32 / 7.0;
+        [angle, -angle]
+    })
+    .every(4)
+}
+
+#[derive(Resource, Default)]
+struct Steered(Vec<f32>);
+
+#[test]
+fn numbers_hold_until_the_next_decision_whoever_decides() {
+    let game = steered();
+    assert_eq!(game.problem(), None);
+    let observation = ObservationConfig::default();
+    let policy = untrained(&game, &observation, PpoConfig { hidden: vec![8], ..PpoConfig::default() });
+    let players: [(&str, &dyn Fn(&mut World, Entity)); 5] = [
+        ("random", &|world, agent| {
+            world.entity_mut(agent).insert(BlindBot::Uniform);
+        }),
+        ("chaos", &|world, agent| {
+            world.entity_mut(agent).insert(BlindBot::Chaos);
+        }),
+        ("demonstrator", &|world, agent| game.tools().bots.attach_demonstrator(world, agent, 0.0)),
+        ("noise", &|world, agent| game.tools().bots.attach_demonstrator(world, agent, 0.5)),
+        ("policy", &|world, agent| {
+            ActivePolicy { policy: policy.clone(), draw: ActionDraw::Sample }.install(world, None);
+            world.entity_mut(agent).insert(Control::Policy);
+        }),
+    ];
+    for (name, equip) in players {
+        let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
+        world.entity_mut(agents[0]).insert((Control::Bot, LevelQueue::Always(3)));
+        equip(&mut world, agents[0]);
+        let mut actions = Vec::new();
+        for tick in 0..24 {
+            world.tick().expect("the held numbers are legal");
+            let decision = world.get::<Decision>(agents[0]).expect("an agent");
+            assert!(name != "policy" || (decision.log_prob == 0.0) == (tick % 4 != 0), "tick {tick}: {decision:?}");
+            let action = world.get::<Action>(agents[0]).expect("an agent").0.clone();
+            assert_eq!(action, ActionValue::Continuous(world.resource::<Steered>().0.clone()), "{name}, tick {tick}");
+            actions.push(action);
+        }
+        for decision in actions.chunks(4) {
+            assert!(decision.iter().all(|action| *action == decision[0]), "{name}: {actions:?}");
+        }
+        assert!(actions.iter().any(|action| *action != actions[0]), "{name}: {actions:?}");
+    }
+}
+
+#[test]
+fn sac_refuses_numbers_that_are_held_and_says_what_learns_them() {
+    let text =
+        r#"(game: "steered", train: "default:0..9", test: "default:10..19", steps: 4096, arenas: 2, algorithm: "sac")"#;
+    let experiment = parse_experiment(text, Path::new("steered.ron")).expect("valid");
+    let mut trainer = Trainer::new(&steered().time_limit(50), &experiment, None, DeviceKind::Flex, 1).expect("fits");
+    let updates = std::iter::from_fn(|| (!trainer.is_done()).then(|| trainer.update().err()));
+    let text = updates.flatten().next().expect("refused").to_string();
+    assert!(text.contains("numbers that the game holds for several ticks") && text.contains("ppo"), "{text}");
+}
+
 #[test]
 fn decisions_that_cannot_hold_are_problems_that_say_what_to_type() {
     let problem = slow(0).problem().expect("no tick is a decision");
     assert!(problem.contains("`slow`") && problem.contains("type `.every(1)`"), "{problem}");
-    let continuous = ForeignGame::new("slid", 1, |_: &mut App| {})
-        .axes([ActionAxis::mouse_x(2.0)])
-        .observe(["x"], || [0.0])
-        .every(4);
-    let problem = continuous.problem().expect("it cannot be held");
-    assert!(problem.contains("actions with numbers") && problem.contains("lower `.hz`"), "{problem}");
     assert_eq!(slow(1).problem(), None);
 }
 

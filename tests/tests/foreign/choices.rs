@@ -5,6 +5,7 @@ use bevy_playbot::{
     action::Actions,
     demo::file::{DemoReader, DemoWriter},
     virtual_input::ActionAxis,
+    vision::ObservationConfig,
 };
 use playbot::prelude::*;
 use playbot_harness::{
@@ -14,16 +15,16 @@ use playbot_harness::{
     single_actions::single_actions,
     worlds::build_world,
 };
-use playbot_learner::DeviceKind;
+use playbot_learner::{DeviceKind, ppo::LabelledSteps};
 use playbot_tests::training::{check_resuming, last_success_rate};
-use playbot_train::{Experiment, Trainer, experiment::file::parse_experiment};
+use playbot_train::{Experiment, Trainer, demo::Demonstrations, experiment::file::parse_experiment};
 use std::path::Path;
 
 /// Rooms until the end.
 const ROOMS: u32 = 8;
 
-/// A hall of rooms. Each asks for a side, for a jump or none, and for a stick in one half: whoever gives all three gets
-/// into the next room, and time runs out soon.
+/// A hall of rooms. Each asks for a side, for a jump or none, and for a stick in one half. An agent that does all three
+/// in one tick gets into the next room. The episode ends when time runs out.
 #[derive(Resource, Default, Clone)]
 struct Hall {
     seed: u32,
@@ -116,23 +117,67 @@ fn a_demonstrator_records_what_replays_and_wins() {
     assert_eq!((report.episodes, report.divergences), (2, Vec::new()));
 }
 
-fn trainer(steps: u64, threads: usize) -> Trainer {
+fn trainer(game: &ForeignGame, steps: u64, threads: usize) -> Trainer {
     let text = r#"(game: "hall", train: "default:0..199", test: "default:200..299", steps: 32768, arenas: 8,
         algorithm: "ppo", ppo: (num_steps: 128, minibatches: 8, epochs: 8, hidden: [32], lr: 0.005, gamma: 0.8, ent_coef: 0.0))"#;
     let experiment = parse_experiment(text, Path::new("hall.ron")).expect("valid");
     let experiment = Experiment { steps, ..experiment };
-    Trainer::new(&hall(), &experiment, None, DeviceKind::Flex, threads).expect("fits")
+    Trainer::new(game, &experiment, None, DeviceKind::Flex, threads).expect("fits")
 }
 
 #[test]
 fn ppo_learns_to_make_all_choices() {
-    let rate = last_success_rate(trainer(32_768, 2)).expect("episodes ended");
+    let rate = last_success_rate(trainer(&hall(), 32_768, 2)).expect("episodes ended");
+    assert!(rate > 0.9, "{rate}");
+}
+
+/// The hall for agents that decide in every third tick: options and number hold in between.
+fn slow_hall() -> ForeignGame {
+    hall().every(3).time_limit(60)
+}
+
+#[test]
+fn ppo_learns_from_the_ticks_in_which_it_decides() {
+    let game = slow_hall();
+    assert_eq!(game.problem(), None);
+    let rate = last_success_rate(trainer(&game, 65_536, 2)).expect("episodes ended");
     assert!(rate > 0.9, "{rate}");
 }
 
 #[test]
+fn a_recording_of_held_actions_says_which_ticks_were_decisions() {
+    let game = slow_hall();
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("hall.demo");
+    let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
+    world.insert_resource(Recorder::new(DemoWriter::create(&path, game.demo_header("default")).expect("fresh")));
+    game.tools().bots.attach_demonstrator(&mut world, agents[0], 0.3);
+    world.entity_mut(agents[0]).insert((Control::Bot, Recording::default(), LevelQueue::list([3, 4])));
+    while world.get::<Control>(agents[0]) != Some(&Control::Idle) {
+        world.tick().expect("sound");
+    }
+    drop(world);
+    let report = verify_file(&game, &path, |_| {}).expect("readable");
+    assert_eq!((report.episodes, report.divergences), (2, Vec::new()));
+    let episodes = DemoReader::open(&path).and_then(DemoReader::read_all).expect("whole");
+    for episode in &episodes {
+        for tick in (0..episode.len()).filter(|tick| tick % 3 != 0) {
+            assert_eq!(episode.actions.get(tick), episode.actions.get(tick - 1), "tick {tick}");
+        }
+    }
+    let demos = Demonstrations::read(&game, &ObservationConfig::default(), &path, None).expect("readable");
+    let dataset = demos.dataset(&game, 1, |_| {}).expect("replays");
+    let steps = LabelledSteps::of(&dataset).expect("of one kind");
+    let free: Vec<bool> = steps.legal.chunks(6).map(|row| row[5]).collect();
+    let ticks = episodes.iter().flat_map(|episode| 0..episode.len());
+    assert_eq!(free, ticks.map(|tick| tick % 3 == 0).collect::<Vec<_>>());
+}
+
+#[test]
 fn stops_and_threads_change_nothing() {
-    check_resuming(&hall(), |threads| trainer(4096, threads), 2);
+    for game in [hall(), slow_hall()] {
+        check_resuming(&game, |threads| trainer(&game, 4096, threads), 2);
+    }
 }
 
 #[test]
@@ -150,7 +195,4 @@ fn choices_that_cannot_be_made_at_once_are_problems_that_say_what_to_type() {
     assert!(text.contains("leave `.separately` out"), "{text}");
     let text = problem(game().choices([jump(), jump()]).axes([ActionAxis::mouse_x(1.0)]));
     assert!(text.contains("`.choices` and `.axes`"), "{text}");
-    let stick = [ActionAxis::stick(GamepadAxis::RightStickX)];
-    let text = problem(game().choices([jump()]).separately().axes(stick).every(4));
-    assert!(text.contains("actions with numbers"), "{text}");
 }

@@ -241,18 +241,8 @@ impl Plugin for ForeignPlugin {
         )
         .add_systems(judge, observe::read_outcome.before(PlaybotSystems::Judge).run_if(is_tick));
         observe::add_observation(app);
-        if description.legal.is_some() || description.input.holds() {
+        if description.legal.is_some() {
             input::add_mask(app);
-        }
-        if description.input.holds() {
-            app.add_systems(
-                decide,
-                input::hold
-                    .in_set(PlaybotSystems::Act)
-                    .after(check_actions)
-                    .after(note_actions)
-                    .ambiguous_with(PlaybotSystems::Act),
-            );
         }
         input::add_rest(app, &description.input);
         #[cfg(feature = "ui")]

@@ -9,7 +9,7 @@ use crate::{
 };
 use bevy::prelude::*;
 use bevy_playbot::{
-    action::{Action, ActionSpace, ActionValue},
+    action::{Action, ActionSpace},
     agent::{Agent, Control},
     bot::with_noise,
     demo::{file::Decider, replay::Replay},
@@ -21,7 +21,6 @@ use bevy_playbot::{
     systems::{ObserveSchedule, PlaybotSystems},
     virtual_input::{ActionAxis, HeldInput, PointerPosition, PressSystems, UnknownInput, VirtualButton, VirtualInput},
 };
-use std::ops::Range;
 
 /// Most choices that an agent makes separately in one tick.
 const MOST_CHOICES_AT_ONCE: usize = playbot_learner::MOST_CHOICES;
@@ -189,8 +188,8 @@ impl ForeignGame {
     /// one, bots, explorers and policies repeat it: it is the only legal action. Held keys stay pressed, while clicks
     /// and taps are made in each tick. Rewards, recordings, time limits and skill intervals count ticks, as ever.
     ///
-    /// People decide in each tick. Numbers of actions have no mask, so they cannot be held: that is a
-    /// [`problem`](crate::game::Game::problem).
+    /// People decide in each tick. SAC cannot learn numbers that are held. See [`DecisionPeriod`], which agents without a
+    /// `ForeignGame` may have too.
     ///
     /// ```
     /// use bevy::prelude::*;
@@ -486,13 +485,9 @@ impl Input {
 
     /// Returns the problem of the ticks that a decision holds.
     fn problem_of_period(&self) -> Option<String> {
-        match (self.every?, self.space()) {
-            (0, _) => Some(
-                "has `.every(0)`, but a decision holds for at least one tick: type `.every(1)`, or leave it out".to_owned(),
-            ),
-            (2.., space) if space.numbers() > 0 => Some(
-                "has `.every` and actions with numbers, which cannot be held: leave `.every` out, and lower `.hz` for fewer \
-                 decisions a second"
+        match self.every? {
+            0 => Some(
+                "has `.every(0)`, but a decision holds for at least one tick: type `.every(1)`, or leave it out"
                     .to_owned(),
             ),
             _ => None,
@@ -537,11 +532,6 @@ impl Input {
     /// Returns whether decisions hold for more than one tick.
     pub(super) fn holds(&self) -> bool {
         self.every.is_some_and(|ticks| ticks > 1)
-    }
-
-    /// Returns whether the agent decides in this tick of an episode.
-    pub(super) fn is_decision(&self, tick: u32) -> bool {
-        !self.holds() || self.every.is_some_and(|ticks| tick.is_multiple_of(ticks))
     }
 
     /// Returns the number of the first action that clicks on the UI, and the names of the buttons.
@@ -689,12 +679,9 @@ fn decide_for(world: &mut World, agent: Entity) {
     else {
         return;
     };
-    let tick = world.get::<Episode>(agent).map_or(0, |episode| episode.tick);
     let planned = with_foreign(world, agent, |world, foreign| {
-        let held = foreign.held_in(tick);
-        // It sees every tick, since it may count them.
-        let planned = foreign.asked().bot(name)?.demand(world)?;
-        Ok(held.unwrap_or(planned))
+        // It sees every tick, since it may count them, also if an earlier decision holds.
+        foreign.asked().bot(name)?.demand(world)
     });
     let Some(planned) = planned else { return };
     let mut entity = world.entity_mut(agent);
@@ -703,20 +690,6 @@ fn decide_for(world: &mut World, agent: Entity) {
     let Some(mut streams) = entity.get_mut::<AgentStreams>() else { return };
     let chosen = with_noise(planned, &space, legal.as_ref(), noise, &mut streams.action);
     entity.insert(Action(chosen));
-}
-
-/// Notes the action of a tick in which the agent decides, which holds until the next decision.
-pub(super) fn hold(world: &mut World) {
-    for agent in playing_agents(world) {
-        let tick = world.get::<Episode>(agent).map_or(0, |episode| episode.tick);
-        let action = world.get::<Action>(agent).map(|action| action.0.clone());
-        with_foreign(world, agent, |_, foreign| {
-            if foreign.game.description.input.is_decision(tick) {
-                foreign.asked().held = action;
-            }
-            Ok(())
-        });
-    }
 }
 
 /// Adds the system that lets keys go before the next decision, if the game wants that.
@@ -764,13 +737,11 @@ pub(super) fn add_mask(app: &mut App) {
 
 pub(super) fn mask(world: &mut World) {
     for agent in playing_agents(world) {
-        let tick = world.get::<Episode>(agent).map_or(0, |episode| episode.tick);
         let legal = with_foreign(world, agent, |world, foreign| {
             let space = foreign.game.description.input.space();
-            let mask = match (foreign.held_in(tick), &mut foreign.asked().legal) {
-                (Some(held), _) => only(&held, &space),
-                (None, Some(system)) => system.demand(world)?,
-                (None, None) => vec![true; space.options()],
+            let mask = match &mut foreign.asked().legal {
+                Some(system) => system.demand(world)?,
+                None => vec![true; space.options()],
             };
             Ok(LegalActions::of_space(&space, mask))
         });
@@ -778,16 +749,6 @@ pub(super) fn mask(world: &mut World) {
             note(world, agent, Some(legal));
         }
     }
-}
-
-/// Returns the mask that allows this action alone.
-fn only(held: &ActionValue, space: &ActionSpace) -> Vec<bool> {
-    let held = Action(held.clone());
-    let is_held = |(choice, at): (usize, Range<usize>)| {
-        let taken = held.option(choice);
-        (0..at.len()).map(move |option| taken == Some(option as u32)).collect::<Vec<_>>()
-    };
-    space.choices().ranges().enumerate().flat_map(is_held).collect()
 }
 
 #[cfg(test)]

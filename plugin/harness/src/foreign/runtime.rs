@@ -75,8 +75,6 @@ pub(super) struct AgentParts {
     pub(super) end_cause: Option<OwnedSystem<Option<&'static str>>>,
     pub(super) act: Option<OwnedSystem<()>>,
     pub(super) legal: Option<OwnedSystem<Vec<bool>>>,
-    /// The last decision, if decisions hold for several ticks.
-    pub(super) held: Option<ActionValue>,
     pub(super) demonstrator: Option<OwnedSystem<ActionValue>>,
     /// The other scripted bots, with their names.
     pub(super) bots: Vec<(&'static str, OwnedSystem<ActionValue>)>,
@@ -100,7 +98,6 @@ impl AgentParts {
             end_cause: description.end_cause.as_ref().map(|system| system.make()),
             act: description.act.as_ref().map(|system| system.make()),
             legal: description.legal.as_ref().map(|system| system.make()),
-            held: None,
             demonstrator: description.demonstrator.as_ref().map(|(_, system)| system.make()),
             bots: description.bots.iter().map(|(name, system)| (*name, system.make())).collect(),
         }
@@ -218,16 +215,6 @@ impl Foreign {
     /// Returns the parts of the rewards of all agents.
     pub(super) fn rewards(&mut self) -> impl Iterator<Item = &mut RewardPart> {
         self.agents.iter_mut().flat_map(|parts| &mut parts.rewards)
-    }
-
-    /// Returns the decision of the agent that is asked about, if it still holds in this tick of an episode.
-    pub(super) fn held_in(&self, tick: u32) -> Option<ActionValue> {
-        if self.game.description.input.is_decision(tick) { None } else { self.agents[self.asked].held.clone() }
-    }
-
-    /// Returns the last decisions of all agents.
-    pub(super) fn held(&mut self) -> impl Iterator<Item = &mut Option<ActionValue>> {
-        self.agents.iter_mut().map(|parts| &mut parts.held)
     }
 }
 

@@ -33,7 +33,6 @@ use bevy::{
     window::WindowEvent,
 };
 use bevy_playbot::{
-    action::ActionValue,
     agent::{AgentOrder, Control},
     bot::HeldAction,
     engine::panics,
@@ -194,8 +193,6 @@ struct SavedGame {
     others: Vec<(Entity, KeptAgent)>,
     /// The last value of each part of the reward.
     rewards: Vec<Option<f32>>,
-    /// The last decision, if decisions hold for several ticks.
-    held: Vec<Option<ActionValue>>,
     devices: Option<VirtualDevices>,
     keys: Option<ButtonInput<KeyCode>>,
     letters: Option<ButtonInput<Key>>,
@@ -224,7 +221,6 @@ impl SnapshotTools for ForeignGame {
             state: kept_state(world, agent),
             others: others(world, agent),
             rewards: foreign.rewards().map(|part| part.last).collect(),
-            held: foreign.held().map(|held| held.clone()).collect(),
             devices: world.get_resource().cloned(),
             keys: world.get_resource().cloned(),
             letters: world.get_resource().cloned(),
@@ -254,13 +250,11 @@ impl SnapshotTools for ForeignGame {
         }
         world.flush();
         cell.lock().rewards().zip(&saved.rewards).for_each(|(part, last)| part.last = *last);
-        for (held, last) in cell.lock().held().zip(&saved.held) {
-            held.clone_from(last);
-        }
         put_state(world, agent, &saved.state);
-        for (other, kept) in &saved.others {
+        for (other, (state, control, held)) in &saved.others {
             if let Ok(mut other) = world.get_entity_mut(*other) {
-                other.insert(kept.clone());
+                state.put(&mut other);
+                other.insert((*control, held.clone()));
             }
         }
         put(world, saved.devices.clone());

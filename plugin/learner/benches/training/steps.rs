@@ -106,6 +106,7 @@ fn ppo_step(
         recall: None,
         left: None,
         logit_offsets: None,
+        free: None,
         ppo: PpoBatch {
             actions: ActionBatch::new(&actions, &device),
             old_log_probs: column() * 0.01 - libm::logf(CHOICES as f32),

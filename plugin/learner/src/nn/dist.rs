@@ -3,7 +3,7 @@
 use crate::{
     ActionSpace, Actions, Choices, LearnError, MixedSpace,
     device::{read, send},
-    nn::params::{host, matrix},
+    nn::params::{host, matrix, vector},
 };
 use burn::tensor::{Device, Int, Tensor, TensorData, activation::log_softmax};
 use playbot_kernels::{
@@ -35,6 +35,9 @@ pub enum Dist {
         mean: Tensor<2>,
         /// Logarithm of the standard deviation, `[n, dim]`, or `[1, dim]` for all rows alike.
         log_std: Tensor<2>,
+        /// 0 for rows whose numbers are held from an earlier tick, and 1 for the others, `[n]`. Nothing is drawn in
+        /// such a row: its log-density, entropy and divergence are 0. `None` if all are drawn.
+        free: Option<Tensor<1>>,
     },
     /// Independent parts: a categorical distribution for each of several choices, and a Gaussian for the vector, if
     /// there is one. Log-probabilities, entropies and divergences are the sums over the parts.
@@ -126,10 +129,10 @@ impl Dist {
             (Self::Categorical { log_probs }, ActionBatch::Discrete(index)) => {
                 Ok(log_probs.clone().gather(1, index.clone()).squeeze_dim(1))
             }
-            (Self::Gaussian { mean, log_std }, ActionBatch::Continuous(action)) => {
+            (Self::Gaussian { mean, log_std, free }, ActionBatch::Continuous(action)) => {
                 let score = (action.clone() - mean.clone()) * exp(log_std.clone().neg());
                 let terms = score.square() * 0.5 + log_std.clone() + HALF_LN_TAU;
-                Ok(terms.sum_dim(1).squeeze_dim(1).neg())
+                Ok(of_free(terms.sum_dim(1).squeeze_dim(1).neg(), free.as_ref()))
             }
             (Self::Joint(parts), ActionBatch::Joint(actions)) if parts.len() == actions.len() => {
                 sum_of(parts.iter().zip(actions).map(|(part, action)| part.log_prob(action)))
@@ -146,7 +149,9 @@ impl Dist {
                 let terms = exp(log_probs.clone()) * log_probs.clone();
                 terms.sum_dim(1).squeeze_dim(1).neg()
             }
-            Self::Gaussian { log_std, .. } => (log_std.clone() + (0.5 + HALF_LN_TAU)).sum_dim(1).squeeze_dim(1),
+            Self::Gaussian { log_std, free, .. } => {
+                of_free((log_std.clone() + (0.5 + HALF_LN_TAU)).sum_dim(1).squeeze_dim(1), free.as_ref())
+            }
             Self::Joint(parts) => {
                 let parts = parts.iter().map(Self::entropy);
                 parts.reduce(|sum, part| sum + part).expect("there is a part, or there would be no action")
@@ -167,11 +172,11 @@ impl Dist {
                 let terms = exp(p.clone()) * (p.clone() - q.clone());
                 Ok(terms.sum_dim(1).squeeze_dim(1))
             }
-            (Self::Gaussian { mean: mp, log_std: lp }, Self::Gaussian { mean: mq, log_std: lq }) => {
+            (Self::Gaussian { mean: mp, log_std: lp, free }, Self::Gaussian { mean: mq, log_std: lq, free: other }) => {
                 let ratio = exp((lp.clone() - lq.clone()) * 2.0);
                 let distance = ((mp.clone() - mq.clone()) * exp(lq.clone().neg())).square();
                 let terms = (ratio + distance - 1.0) * 0.5 + (lq.clone() - lp.clone());
-                Ok(terms.sum_dim(1).squeeze_dim(1))
+                Ok(of_free(terms.sum_dim(1).squeeze_dim(1), free.as_ref().or(other.as_ref())))
             }
             (Self::Joint(these), Self::Joint(others)) if these.len() == others.len() => {
                 sum_of(these.iter().zip(others).map(|(this, other)| this.kl(other)))
@@ -199,12 +204,24 @@ impl Dist {
         }
     }
 
+    /// Returns the distributions with the rows whose numbers are held: 0 for these and 1 for the others, `[n]`, or `None`.
+    #[must_use]
+    pub fn with_free(self, rows: Option<&Tensor<1>>) -> Self {
+        match self {
+            Self::Gaussian { mean, log_std, .. } => Self::Gaussian { mean, log_std, free: rows.cloned() },
+            Self::Joint(parts) => Self::Joint(parts.into_iter().map(|part| part.with_free(rows)).collect()),
+            choices @ Self::Categorical { .. } => choices,
+        }
+    }
+
     /// Returns the same numbers without gradients.
     #[must_use]
     pub(crate) fn detach(self) -> Self {
         match self {
             Self::Categorical { log_probs } => Self::Categorical { log_probs: log_probs.detach() },
-            Self::Gaussian { mean, log_std } => Self::Gaussian { mean: mean.detach(), log_std: log_std.detach() },
+            Self::Gaussian { mean, log_std, free } => {
+                Self::Gaussian { mean: mean.detach(), log_std: log_std.detach(), free }
+            }
             Self::Joint(parts) => Self::Joint(parts.into_iter().map(Self::detach).collect()),
         }
     }
@@ -214,7 +231,10 @@ impl Dist {
         let of = |values: &Tensor<2>| values.clone().select(0, rows.clone());
         match self {
             Self::Categorical { log_probs } => Self::Categorical { log_probs: of(log_probs) },
-            Self::Gaussian { mean, log_std } => Self::Gaussian { mean: of(mean), log_std: of(log_std) },
+            Self::Gaussian { mean, log_std, free } => {
+                let free = free.as_ref().map(|free| free.clone().select(0, rows.clone()));
+                Self::Gaussian { mean: of(mean), log_std: of(log_std), free }
+            }
             Self::Joint(parts) => Self::Joint(parts.iter().map(|part| part.select(rows)).collect()),
         }
     }
@@ -228,18 +248,29 @@ impl Dist {
             Self::Categorical { log_probs } => {
                 let [_, choices] = log_probs.dims();
                 let space = ActionSpace::Discrete(choices);
-                Ok(HostDist { space, head: host(log_probs.inner())?, log_std: None })
+                Ok(HostDist { space, head: host(log_probs.inner())?, log_std: None, held: Vec::new() })
             }
-            Self::Gaussian { mean, log_std } => {
+            Self::Gaussian { mean, log_std, free } => {
                 let [n, dim] = mean.dims();
                 let mut stds = host(log_std.inner())?;
                 if stds.len() == dim {
                     stds = stds.repeat(n);
                 }
-                Ok(HostDist { space: ActionSpace::Continuous(dim), head: host(mean.inner())?, log_std: Some(stds) })
+                let free = free.map_or(Ok(Vec::new()), |free| host(free.inner()))?;
+                let held = free.into_iter().map(|free| free == 0.0).collect();
+                let space = ActionSpace::Continuous(dim);
+                Ok(HostDist { space, head: host(mean.inner())?, log_std: Some(stds), held })
             }
             Self::Joint(parts) => joined(parts.into_iter().map(Self::to_host).collect::<Result<Vec<_>, _>>()?),
         }
+    }
+}
+
+/// Returns the terms `[n]`, or `[1]` if they are the same for all rows, without those of rows that are not free.
+fn of_free(terms: Tensor<1>, free: Option<&Tensor<1>>) -> Tensor<1> {
+    match free {
+        Some(free) => terms * free.clone(),
+        None => terms,
     }
 }
 
@@ -250,7 +281,7 @@ fn sum_of(parts: impl Iterator<Item = Result<Tensor<1>, LearnError>>) -> Result<
 }
 
 /// Puts the columns of parts side by side.
-fn joined(parts: Vec<HostDist>) -> Result<HostDist, LearnError> {
+fn joined(mut parts: Vec<HostDist>) -> Result<HostDist, LearnError> {
     let sizes: Vec<usize> = parts.iter().map(|part| part.space.options()).filter(|&size| size > 0).collect();
     let numbers = parts.iter().map(|part| part.space.numbers()).sum();
     let space = ActionSpace::Mixed(MixedSpace { choices: Choices::new(&sizes)?, numbers });
@@ -262,7 +293,9 @@ fn joined(parts: Vec<HostDist>) -> Result<HostDist, LearnError> {
             head.extend_from_slice(&part.head[row * dim..(row + 1) * dim]);
         }
     }
-    Ok(HostDist { space, head, log_std: parts.into_iter().find_map(|part| part.log_std) })
+    // The vector is the last part, if there is one.
+    let (log_std, held) = parts.pop().map_or_else(Default::default, |part| (part.log_std, part.held));
+    Ok(HostDist { space, head, log_std, held })
 }
 
 /// A batch of distributions in host memory.
@@ -274,6 +307,8 @@ pub struct HostDist {
     pub head: Vec<f32>,
     /// Logarithms of the standard deviations, `n * numbers`; `None` without a vector.
     pub log_std: Option<Vec<f32>>,
+    /// True for rows whose numbers are held from an earlier tick, `n`; empty if all are drawn.
+    pub held: Vec<bool>,
 }
 
 impl HostDist {
@@ -295,18 +330,22 @@ impl HostDist {
             });
             matrix(out, rows.len(), dim, device)
         };
-        let stds = || gather(self.log_std.as_deref().unwrap_or_default(), self.space.numbers());
+        let gaussian = |mean| Dist::Gaussian {
+            mean,
+            log_std: gather(self.log_std.as_deref().unwrap_or_default(), self.space.numbers()),
+            free: (!self.held.is_empty())
+                .then(|| vector(rows.iter().map(|&row| if self.held[row] { 0.0 } else { 1.0 }).collect(), device)),
+        };
         let head = gather(&self.head, dim);
         match self.space {
             ActionSpace::Discrete(_) => Dist::Categorical { log_probs: head },
-            ActionSpace::Continuous(_) => Dist::Gaussian { mean: head, log_std: stds() },
+            ActionSpace::Continuous(_) => gaussian(head),
             ActionSpace::Mixed(MixedSpace { choices, numbers }) => {
                 let choice =
                     |at: Range<usize>| Dist::Categorical { log_probs: head.clone().narrow(1, at.start, at.len()) };
                 let mut parts: Vec<Dist> = choices.ranges().map(choice).collect();
                 if numbers > 0 {
-                    let mean = head.clone().narrow(1, choices.options(), numbers);
-                    parts.push(Dist::Gaussian { mean, log_std: stds() });
+                    parts.push(gaussian(head.clone().narrow(1, choices.options(), numbers)));
                 }
                 Dist::Joint(parts)
             }
@@ -442,6 +481,8 @@ pub(crate) struct GaussianRows<'a> {
     actions: &'a [f32],
     /// Head and ln σ of the compared distribution, as `these`.
     other: Option<(&'a [f32], &'a [f32])>,
+    /// True for rows whose numbers are held, of which nothing counts; empty if none are.
+    held: &'a [bool],
     /// True if the divergence is KL(these ‖ other), and not KL(other ‖ these).
     from_these: bool,
 }
@@ -465,7 +506,12 @@ impl<'a> GaussianRows<'a> {
             (&dist.head[at(columns.0)], dist.log_std.as_deref().map_or(&[][..], |stds| &stds[at(dim)]))
         };
         let actions = &actions[at(dim)];
-        Self { dim, columns, these: numbers(these), actions, other: other.map(numbers), from_these }
+        let held = if these.held.is_empty() { &[][..] } else { &these.held[rows.clone()] };
+        Self { dim, columns, these: numbers(these), actions, other: other.map(numbers), held, from_these }
+    }
+
+    fn is_held(&self, row: usize) -> bool {
+        self.held.get(row).copied().unwrap_or(false)
     }
 
     /// Returns the numbers of each dimension of a row: mean, ln σ and action, and the other's mean and ln σ.
@@ -481,6 +527,9 @@ impl<'a> GaussianRows<'a> {
 impl DistRows for GaussianRows<'_> {
     fn terms(&self, row: usize) -> RowTerms {
         let mut terms = RowTerms::default();
+        if self.is_held(row) {
+            return terms;
+        }
         for ([mean, log_std, action], other) in self.dims(row) {
             let score = (action - mean) * libm::expf(-log_std);
             terms.log_prob -= score * score * 0.5 + log_std + HALF_LN_TAU_F32;
@@ -495,6 +544,9 @@ impl DistRows for GaussianRows<'_> {
     }
 
     fn gradient(&self, row: usize, by: RowTerms, head: &mut [f32], log_std_grads: &mut [f32]) {
+        if self.is_held(row) {
+            return head[..self.dim].fill(0.0);
+        }
         for ((([mean, log_std, action], other), to), of_std) in self.dims(row).zip(head).zip(log_std_grads) {
             let inverse = libm::expf(-log_std);
             let score = (action - mean) * inverse;

@@ -175,7 +175,7 @@ const EDGE: f64 = 0.999;
 pub fn unsquashed(decoder: &HostDist) -> HostDist {
     let (Some(stds), ActionSpace::Continuous(_)) = (&decoder.log_std, decoder.space) else { return decoder.clone() };
     let before = |action: f64| libm::atanh(action.clamp(-EDGE, EDGE));
-    let mut out = HostDist { space: decoder.space, head: Vec::new(), log_std: None };
+    let mut out = HostDist { head: Vec::new(), log_std: None, ..decoder.clone() };
     let mut log_std = Vec::with_capacity(stds.len());
     for (&mean, &log) in decoder.head.iter().zip(stds) {
         let mean = f64::from(mean).clamp(-EDGE, EDGE);
@@ -230,7 +230,12 @@ mod tests {
     }
 
     fn of(mean: f32, std: f32) -> (f32, f32) {
-        let decoder = HostDist { space: ActionSpace::Continuous(1), head: vec![mean], log_std: Some(vec![std.ln()]) };
+        let decoder = HostDist {
+            space: ActionSpace::Continuous(1),
+            head: vec![mean],
+            log_std: Some(vec![std.ln()]),
+            held: Vec::new(),
+        };
         let mapped = unsquashed(&decoder);
         (mapped.head[0], mapped.log_std.expect("continuous")[0].exp())
     }
@@ -263,7 +268,8 @@ mod tests {
 
     #[test]
     fn choices_are_left_alone() {
-        let choices = HostDist { space: ActionSpace::Discrete(2), head: vec![-0.5, -0.9], log_std: None };
+        let choices =
+            HostDist { space: ActionSpace::Discrete(2), head: vec![-0.5, -0.9], log_std: None, held: Vec::new() };
         assert_eq!(unsquashed(&choices), choices);
     }
 }

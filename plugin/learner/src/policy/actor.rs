@@ -238,14 +238,14 @@ impl Actor {
     fn gaussian(&self, head: Tensor<2>, features: Tensor<2>) -> Dist {
         match &self.log_std {
             // Where there are numbers there is ln σ.
-            LogStd::None => Dist::Gaussian { log_std: head.zeros_like(), mean: head },
-            LogStd::Vector(log_std) => Dist::Gaussian { mean: head, log_std: log_std.clone().unsqueeze() },
+            LogStd::None => Dist::Gaussian { log_std: head.zeros_like(), mean: head, free: None },
+            LogStd::Vector(log_std) => Dist::Gaussian { mean: head, log_std: log_std.clone().unsqueeze(), free: None },
             LogStd::State(layer) => {
                 let (low, high) = LOG_STD_RANGE;
-                Dist::Gaussian { mean: head, log_std: layer.forward(features).clamp(low, high) }
+                Dist::Gaussian { mean: head, log_std: layer.forward(features).clamp(low, high), free: None }
             }
             LogStd::Squashed { layer, range } => {
-                Dist::Gaussian { mean: head, log_std: bounded_log_std(layer.forward(features), *range) }
+                Dist::Gaussian { mean: head, log_std: bounded_log_std(layer.forward(features), *range), free: None }
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::{
     ActionSpace, Augmentation, ObsKind, ObsSlice, Observations, Rollout,
-    legal::logit_offsets,
+    legal::{free_rows, logit_offsets},
     nn::{ActionBatch, ImageNet, ObsBatch, vector},
     norm::ObsStats,
     observation::augmented,
@@ -178,6 +178,7 @@ impl Batch<'_> {
             recall: None,
             left: (!rollout.left.is_empty()).then(|| vector(pick(&rollout.left), device)),
             logit_offsets: logit_offsets(&rollout.legal, rows, &self.space, device),
+            free: free_rows(&rollout.legal, rows, &self.space, device),
             ppo: PpoBatch {
                 actions: ActionBatch::new(&rollout.actions.gather(rows), device),
                 old_log_probs: vector(pick(&rollout.log_probs), device),

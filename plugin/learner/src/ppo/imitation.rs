@@ -5,7 +5,7 @@ use crate::{
     Rollout,
     device::update_on,
     file::{FileKind, TensorFile},
-    legal::logit_offsets,
+    legal::{free_rows, logit_offsets},
     nn::{ActionBatch, NamedGrads, ParamVisitor, Parameters, finite},
     policy::{InputBuilder, LogStd, Recall},
     ppo::{
@@ -131,7 +131,7 @@ impl LabelledSteps {
         let (before, rows) = (self.len(), more.len());
         self.obs.push(more.obs.as_slice())?;
         self.actions.extend_rows(&more.actions, 0, rows)?;
-        crate::legal::extend(&mut self.legal, before, &more.legal, rows, spec.action_space.options());
+        crate::legal::extend(&mut self.legal, before, &more.legal, rows, spec.action_space.mask_width());
         self.begins.extend(more.begins.iter().map(|row| before + row));
         Ok(())
     }
@@ -198,7 +198,7 @@ impl LabelledSteps {
             }
         }
         spec.action_space.check(&actions).map_err(|error| file.learner(error))?;
-        let of_mask = product(&file, "legal", space.options())?;
+        let of_mask = product(&file, "legal", space.mask_width())?;
         let legal = if header.is_masked { file.take_flags("legal", of_mask)? } else { Vec::new() };
         file.finish()?;
         Ok(Self { obs, actions, legal, begins: header.begins })
@@ -265,7 +265,8 @@ impl PpoLearner {
                 let joined = self.nets.actor.join(&inputs.input(rows, &device))?;
                 let features = self.nets.actor.recall(joined, recall.as_ref())?;
                 let offsets = logit_offsets(&steps.legal, rows, &spec.action_space, &device);
-                let dist = self.nets.actor.forward_legal(features, offsets.as_ref());
+                let free = free_rows(&steps.legal, rows, &spec.action_space, &device);
+                let dist = self.nets.actor.forward_legal(features, offsets.as_ref()).with_free(free.as_ref());
                 let labels = ActionBatch::new(&steps.actions.gather(rows), &device);
                 let loss = dist.log_prob(&labels)?.neg().mean();
                 let nll = finite("imitation_loss", &loss, self.adam.steps)?;

@@ -7,7 +7,7 @@
 use crate::{
     LearnError, ObsKind, ObsSlice,
     device::send,
-    legal::logit_offsets,
+    legal::{free_rows, logit_offsets},
     nn::{ActionBatch, Adam, Dist, FlatGrads, PackedPixels, host, matrix, vector},
     policy::NetInput,
     ppo::{
@@ -34,6 +34,7 @@ pub(super) struct SentRollout<'a> {
     states: States,
     left: Option<Tensor<1>>,
     logit_offsets: Option<Tensor<2>>,
+    free: Option<Tensor<1>>,
     ppo: PpoBatch,
     teacher: Option<(Dist, Tensor<1>)>,
     intrinsic_returns: Option<Tensor<1>>,
@@ -67,6 +68,7 @@ impl<'a> SentRollout<'a> {
             states: States::send(batch, &all, device),
             left: (!rollout.left.is_empty()).then(|| column(&rollout.left)),
             logit_offsets: logit_offsets(&rollout.legal, &all, &batch.space, device),
+            free: free_rows(&rollout.legal, &all, &batch.space, device),
             ppo: PpoBatch {
                 actions: ActionBatch::new(&rollout.actions, device),
                 old_log_probs: column(&rollout.log_probs),
@@ -116,6 +118,7 @@ impl<'a> SentRollout<'a> {
             inputs,
             recall: None,
             left: self.left.as_ref().map(column),
+            free: self.free.as_ref().map(column),
             logit_offsets: self.logit_offsets.as_ref().map(|offsets| offsets.clone().select(0, at.clone())),
             ppo: PpoBatch {
                 actions: self.ppo.actions.select(at),

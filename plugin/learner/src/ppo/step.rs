@@ -57,6 +57,8 @@ pub struct Minibatch {
     /// Numbers that are added to the logits, `[n, choices]`, if some choices are illegal: see
     /// [`Actor::forward_legal`](crate::policy::Actor::forward_legal).
     pub logit_offsets: Option<Tensor<2>>,
+    /// 0 for rows whose numbers are held from an earlier tick, and 1 for the others, `[n]`; `None` if none are.
+    pub free: Option<Tensor<1>>,
     /// Constants of the PPO loss.
     pub ppo: PpoBatch,
     /// Constants of the penalty, if there is one.
@@ -193,7 +195,7 @@ pub(super) fn outputs(
     moment: &UpdateSettings<'_>,
 ) -> Result<Outputs, LearnError> {
     let inputs = nets.actor.recall(nets.actor.join(inputs)?, batch.recall.as_ref())?;
-    let dist = nets.actor.forward_legal(inputs.clone(), batch.logit_offsets.as_ref());
+    let dist = nets.actor.forward_legal(inputs.clone(), batch.logit_offsets.as_ref()).with_free(batch.free.as_ref());
     let is_apart = moment.is_warming_up || !config.critic_trains_cnn;
     let features = nets.critic.net.features(if is_apart { inputs.detach() } else { inputs });
     let intrinsic = nets.intrinsic.as_ref().map(|head| head.number(features.clone()));
@@ -344,7 +346,7 @@ fn columns(dist: &Dist) -> usize {
 fn with_gradient(total: Tensor<1>, dist: &Dist, of_head: Vec<f32>, of_log_std: Vec<f32>) -> Tensor<1> {
     match dist {
         Dist::Categorical { log_probs } => total + known_gradient(log_probs.clone(), 0.0, of_head),
-        Dist::Gaussian { mean, log_std } => {
+        Dist::Gaussian { mean, log_std, .. } => {
             let [rows, dim] = log_std.dims();
             let of_log_std = if rows == 1 { column_sums(&of_log_std, dim) } else { of_log_std };
             total + known_gradient(mean.clone(), 0.0, of_head) + known_gradient(log_std.clone(), 0.0, of_log_std)

@@ -293,6 +293,19 @@ pub(super) struct Transition<'a> {
     pub(super) next_legal: Option<&'a [bool]>,
 }
 
+/// Checks that no numbers are held from an earlier tick: a critic would have to know how long they still are.
+///
+/// # Errors
+/// [`LearnError::Action`] otherwise.
+pub(crate) fn check_free(rollout: &Rollout, space: &ActionSpace) -> Result<(), LearnError> {
+    if rollout.legal.is_empty() || space.numbers() == 0 {
+        return Ok(());
+    }
+    let text = "sac cannot learn numbers that the game holds for several ticks: let the agent decide in each tick, or \
+                learn with ppo";
+    Err(LearnError::Action(text.to_owned()))
+}
+
 /// Checks that a checked rollout holds the states where episodes were cut off and where it stops.
 ///
 /// # Errors

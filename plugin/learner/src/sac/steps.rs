@@ -65,7 +65,7 @@ impl PolicyActions {
         let divergence = prior.map(|prior| dist.kl(prior)).transpose()?;
         match (dist, noise) {
             (Dist::Categorical { log_probs }, _) => Ok(Self::All(log_probs)),
-            (Dist::Gaussian { mean, log_std }, Some(noise)) => {
+            (Dist::Gaussian { mean, log_std, .. }, Some(noise)) => {
                 let device = noise.device();
                 let squashed = SquashedGaussian::unit(mean, log_std, &device);
                 let draw = squashed.draw(noise.clone(), LogProbForm::Eps);

@@ -175,7 +175,8 @@ mod tests {
     #[test]
     fn discrete_by_hand() {
         let head = [0.5f32, 0.2, 0.3].map(f32::ln);
-        let decoder = HostDist { space: ActionSpace::Discrete(3), head: [head, head].concat(), log_std: None };
+        let decoder =
+            HostDist { space: ActionSpace::Discrete(3), head: [head, head].concat(), log_std: None, held: Vec::new() };
         let actions = Actions::Discrete(vec![2, 0]);
         let confidence = |kind| confidences(kind, &decoder, &actions).expect("they fit");
         close(&confidence(ConfidenceKind::PolicyAction), &[0.3, 0.5]);
@@ -189,7 +190,8 @@ mod tests {
         // z-scores 1 and 2 in the first row, none in the second.
         let ln2 = std::f32::consts::LN_2;
         let log_std = Some(vec![0.0, ln2, 0.0, ln2]);
-        let decoder = HostDist { space: ActionSpace::Continuous(2), head: vec![0.0, 1.0, 0.0, 1.0], log_std };
+        let (space, head) = (ActionSpace::Continuous(2), vec![0.0, 1.0, 0.0, 1.0]);
+        let decoder = HostDist { space, head, log_std, held: Vec::new() };
         let actions = Actions::Continuous { dim: 2, values: vec![1.0, -3.0, 0.0, 1.0] };
         let confidence = |kind| confidences(kind, &decoder, &actions).expect("they fit");
         close(&confidence(ConfidenceKind::PolicyAction), &[libm::exp(-1.25), 1.0]);
@@ -200,8 +202,8 @@ mod tests {
 
     #[test]
     fn by_default_a_gaussian_tells_actions_apart() {
-        let decoder =
-            HostDist { space: ActionSpace::Continuous(1), head: vec![0.0, 0.0], log_std: Some(vec![0.0, 0.0]) };
+        let (space, log_std) = (ActionSpace::Continuous(1), Some(vec![0.0, 0.0]));
+        let decoder = HostDist { space, head: vec![0.0, 0.0], log_std, held: Vec::new() };
         let actions = Actions::Continuous { dim: 1, values: vec![0.0, 2.0] };
         let mut rng = Streams::new(1).stream("own", 0);
         let weights = penalty_weights(&ScoreConfig::default(), &decoder, &actions, &mut rng).expect("they fit");
@@ -213,7 +215,8 @@ mod tests {
 
     #[test]
     fn legacy_forms_have_their_own_weights() {
-        let decoder = HostDist { space: ActionSpace::Continuous(1), head: vec![0.0], log_std: Some(vec![0.0]) };
+        let (space, log_std) = (ActionSpace::Continuous(1), Some(vec![0.0]));
+        let decoder = HostDist { space, head: vec![0.0], log_std, held: Vec::new() };
         let actions = Actions::Continuous { dim: 1, values: vec![0.0] };
         let config = |penalty| ScoreConfig { penalty, confidence: ConfidenceKind::Off, ..ScoreConfig::default() };
         let mut rng = Streams::new(1).stream("own", 0);

@@ -74,13 +74,12 @@ impl Dataset {
         Ok(Self { levels: levels.into(), ..self })
     }
 
-    /// Adds the masks of the actions, episode by episode: an entry for each discrete action of each step, true if it was
-    /// legal. In an episode with an empty mask everything was legal, and it counts as legal where the mask is not known,
+    /// Adds the masks of the actions, episode by episode, as [`Rollout::legal`](crate::Rollout::legal) has them. In an episode with an empty mask everything was legal, and it counts as legal where the mask is not known,
     /// `None`. Masks that forbid nothing are dropped.
     ///
     /// # Errors
     /// [`LearnError::Shape`] unless there is a mask of the right length for each episode, [`LearnError::Action`] if one
-    /// forbids an action that was taken, or if the actions are continuous.
+    /// forbids an action that was taken.
     pub fn with_legal(self, masks: Vec<Option<Vec<bool>>>) -> Result<Self, LearnError> {
         LearnError::check("masks of episodes", self.episodes.len(), masks.len())?;
         for (episode, mask) in self.episodes.iter().zip(&masks) {
@@ -209,14 +208,14 @@ impl Dataset {
         if self.legal.is_empty() {
             return Vec::new();
         }
-        let choices = self.space.options();
-        let mut legal = Vec::with_capacity(windows.len() * steps * choices);
+        let width = self.space.mask_width();
+        let mut legal = Vec::with_capacity(windows.len() * steps * width);
         for t in 0..steps {
             for window in windows {
                 let (episode, row) = self.step_of(window, t);
-                match self.legal[episode].get(row * choices..(row + 1) * choices) {
+                match self.legal[episode].get(row * width..(row + 1) * width) {
                     Some(mask) => legal.extend_from_slice(mask),
-                    None => legal.resize(legal.len() + choices, true),
+                    None => legal.resize(legal.len() + width, true),
                 }
             }
         }

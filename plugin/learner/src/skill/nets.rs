@@ -3,7 +3,7 @@
 use crate::{
     ActionSpace, FileError, LearnError, ObsKind,
     file::TensorFile,
-    legal::logit_offsets,
+    legal::{free_rows, logit_offsets},
     nn::{
         ActionBatch, Dist, Gru, ImageNet, Linear, Mlp, ObsBatch, ParamSource, ParamVisitor, Parameters, RandomInit,
         path, vector,
@@ -56,8 +56,8 @@ pub struct SkillForward {
 }
 
 impl SkillForward {
-    /// Gives illegal actions of `space` probability 0. `legal` has an entry for each option of each step, time-major, or
-    /// is empty without masks. `actions` are those that were taken.
+    /// Gives illegal actions of `space` probability 0, and leaves out numbers that are held. `legal` is the mask of each
+    /// step, time-major, or is empty without masks. `actions` are those that were taken.
     ///
     /// # Errors
     /// [`LearnError::Action`] if `actions` do not fit the decoder.
@@ -68,18 +68,22 @@ impl SkillForward {
         actions: &ActionBatch,
         device: &Device,
     ) -> Result<Self, LearnError> {
-        let (options, choices) = (space.options(), space.choices());
-        let Some(steps) = legal.len().checked_div(options) else { return Ok(self) };
-        let rows: Vec<usize> = (0..steps).collect();
-        let Some(offsets) = logit_offsets(legal, &rows, &space, device) else { return Ok(self) };
-        let decoded = self.decoded.clone().with_offsets(&offsets);
+        let (width, choices) = (space.mask_width(), space.choices());
+        if legal.is_empty() {
+            return Ok(self);
+        }
+        let rows: Vec<usize> = (0..legal.len() / width).collect();
+        let mut decoded = self.decoded.clone().with_free(free_rows(legal, &rows, &space, device).as_ref());
+        if let Some(offsets) = logit_offsets(legal, &rows, &space, device) {
+            decoded = decoded.with_offsets(&offsets);
+        }
         let count = |mask: &[bool]| match mask.iter().filter(|&&is_legal| is_legal).count() {
             0 => mask.len() as f32,
             count => count as f32,
         };
         // Of several choices, the number of legal actions is the product.
         let actions_of = |mask: &[bool]| choices.ranges().map(|at| count(&mask[at])).product();
-        let counts = legal.chunks_exact(options).map(actions_of).collect();
+        let counts = legal.chunks_exact(width).map(actions_of).collect();
         let nll_per_step = decoded.log_prob(actions)?.neg();
         Ok(Self { nll_per_step, decoded, legal_count: Some(vector(counts, device)), ..self })
     }
@@ -143,7 +147,7 @@ impl SkillNets {
         let posterior = self.encoder.forward(states, encoded_actions, steps)?;
         let prior_features = self.prior.observe(&states.first(states.rows() / steps.max(1)))?;
         let kl_per_sequence = posterior.kl(&self.prior.forward(prior_features.clone()))?;
-        let Dist::Gaussian { mean, log_std } = posterior else {
+        let Dist::Gaussian { mean, log_std, .. } = posterior else {
             return Err(LearnError::Action("the encoder is Gaussian".to_owned()));
         };
         let latent = mean + noise * exp(log_std);
@@ -306,7 +310,11 @@ impl Encoder {
     /// [`LearnError::Config`] if the observations are of the other kind than the network.
     pub fn forward(&self, states: &ObsBatch, actions: Tensor<2>, steps: usize) -> Result<Dist, LearnError> {
         let summary = self.summary(states, actions, steps)?;
-        Ok(Dist::Gaussian { mean: self.mean.forward(summary.clone()), log_std: self.log_std.forward(summary) })
+        Ok(Dist::Gaussian {
+            mean: self.mean.forward(summary.clone()),
+            log_std: self.log_std.forward(summary),
+            free: None,
+        })
     }
 
     /// Returns the recurrent layers' summary of each window, `[B, 2 * gru_hidden]`; inputs and errors as

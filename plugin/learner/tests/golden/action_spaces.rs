@@ -1,20 +1,22 @@
-//! A gradient step of PPO and of SCORE on several choices, on choices and numbers together, and under masks.
+//! A gradient step of PPO and of SCORE on several choices, on choices and numbers together, under masks, and where the
+//! game holds an earlier action.
 
 use crate::case::{Case, host};
-use crate::update::{After, check_gradients};
+use crate::update::check_step;
 use burn::tensor::{Tensor, TensorData};
-use playbot_learner::nn::{ActionBatch, Adam, AdamConfig, Dist, Parameters, tracked};
+use playbot_learner::nn::{ActionBatch, Dist, tracked};
 use playbot_learner::policy::{Actor, Critic, NetShape};
-use playbot_learner::ppo::{Minibatch, PpoBatch, PpoNets, gradient_step, normalize_advantages};
+use playbot_learner::ppo::{Minibatch, PpoBatch, PpoNets, normalize_advantages};
 use playbot_learner::rng::Streams;
 use playbot_learner::score::{TeacherBatch, confidences};
 use playbot_learner::{
-    ActionSpace, Actions, Choices, ConfidenceKind, DeviceKind, KlDirection, MixedSpace, PpoConfig, ScoreConfig, StdKind,
+    ActionSpace, Actions, Choices, ConfidenceKind, DeviceKind, KlDirection, MixedSpace, ScoreConfig, StdKind,
 };
 
 fn space(case: &Case) -> ActionSpace {
     match (&case.sizes("choices")[..], case.dim("numbers")) {
         (&[choices], 0) => ActionSpace::Discrete(choices),
+        (&[], numbers) => ActionSpace::Continuous(numbers),
         (sizes, numbers) => {
             ActionSpace::Mixed(MixedSpace { choices: Choices::new(sizes).expect("few choices"), numbers })
         }
@@ -30,7 +32,8 @@ fn actions(case: &Case, space: &ActionSpace) -> Actions {
             dim: mixed.numbers,
             values: if mixed.numbers > 0 { case.f32s("in.numbers") } else { Vec::new() },
         },
-        _ => Actions::Discrete(options),
+        ActionSpace::Continuous(dim) => Actions::Continuous { dim: *dim, values: case.f32s("in.numbers") },
+        ActionSpace::Discrete(_) => Actions::Discrete(options),
     }
 }
 
@@ -66,11 +69,12 @@ fn check(name: &str) {
         case.fill(&mut actor, "param.", "actor", kind);
         case.fill(&mut critic, "param.", "critic", kind);
         case.fill(&mut decoder, "in.", "frozen", kind);
-        let mut nets = tracked(&PpoNets { actor, critic, intrinsic: None });
+        let nets = tracked(&PpoNets { actor, critic, intrinsic: None });
 
         let (x, actions) = (case.tensor::<2>("in.obs", &device), actions(&case, &space));
         let logit_offsets = offsets(&case, &space, kind);
-        let of = |actor: &Actor| actor.forward_legal(x.clone(), logit_offsets.as_ref());
+        let free = case.has("in.free").then(|| case.tensor::<1>("in.free", &device));
+        let of = |actor: &Actor| actor.forward_legal(x.clone(), logit_offsets.as_ref()).with_free(free.as_ref());
         let (policy, decoded) = (of(&nets.actor), of(&decoder));
         let taken = ActionBatch::new(&actions, &device);
         case.check("out.log_probs", &host(policy.log_prob(&taken).expect("same kind")));
@@ -92,6 +96,7 @@ fn check(name: &str) {
             recall: None,
             left: None,
             logit_offsets: logit_offsets.clone(),
+            free: free.clone(),
             ppo: PpoBatch {
                 actions: taken,
                 old_log_probs: column("in.old_log_probs"),
@@ -106,39 +111,13 @@ fn check(name: &str) {
             }),
             intrinsic_returns: None,
         };
-        let config = PpoConfig {
-            clip: case.number("clip"),
-            vf_coef: case.number("vf_coef"),
-            ent_coef: case.number("ent_coef"),
-            max_grad_norm: case.number("max_grad_norm"),
-            ..PpoConfig::default()
-        };
         let score = ScoreConfig {
             kl_coef: case.number("kl_coef"),
             kl_direction: KlDirection::DecoderPolicy,
             confidence: ConfidenceKind::PolicyAction,
             ..ScoreConfig::default()
         };
-        let mut still = nets.clone();
-        let mut adam = Adam::new(AdamConfig { beta1: 0.0, beta2: 0.0, ..AdamConfig::default() });
-        let unclipped = PpoConfig { max_grad_norm: 1e30, ..config.clone() };
-        gradient_step(&mut still, &mut adam, &batch, &unclipped, Some(&score), 0.0).expect("finite");
-        check_gradients(&case, "step1_grad.", ("", ""), &mut still, &adam);
-        let mut adam = Adam::new(AdamConfig { eps: case.number("adam_eps"), ..AdamConfig::default() });
-        let step = gradient_step(&mut nets, &mut adam, &batch, &config, Some(&score), case.number("lr"));
-        let step = step.expect("finite");
-        for (name, got) in [
-            ("policy_loss", step.policy_loss),
-            ("value_loss", step.value_loss),
-            ("entropy", step.entropy),
-            ("total_loss", step.total_loss),
-            ("grad_norm", step.grad_norm),
-            ("decoder_kl", step.decoder_kl),
-            ("kl_penalty", step.kl_penalty),
-        ] {
-            case.check_number(name, got);
-        }
-        nets.visit("", &mut After(&case));
+        check_step(&case, nets, &batch, Some(&score));
     }
     case.finish(&[]);
 }
@@ -156,4 +135,14 @@ fn golden_choices_and_numbers_under_masks() {
 #[test]
 fn golden_masked_choice() {
     check("masked_choice");
+}
+
+#[test]
+fn golden_numbers_that_are_held() {
+    check("held_numbers");
+}
+
+#[test]
+fn golden_choices_and_numbers_that_are_held() {
+    check("held_action");
 }

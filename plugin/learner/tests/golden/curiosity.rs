@@ -80,6 +80,7 @@ fn check_losses(case: &Case, kind: DeviceKind, returns: &[f32], mut advantages: 
         recall: None,
         left: None,
         logit_offsets: None,
+        free: None,
         ppo: PpoBatch {
             actions: ActionBatch::new(&case.actions("in.actions"), &device),
             old_log_probs: case.tensor("in.old_log_probs", &device),

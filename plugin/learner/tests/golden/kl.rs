@@ -19,7 +19,7 @@ fn policy(case: &Case, kind: DeviceKind) -> (Dist, Leaves) {
     let mean = leaf(case.tensor("param.pol_mean", &device));
     let log_std = leaf(case.tensor::<1>("param.pol_log_std", &device).unsqueeze());
     let leaves = vec![("pol_mean", mean.clone()), ("pol_log_std", log_std.clone())];
-    (Dist::Gaussian { mean, log_std }, leaves)
+    (Dist::Gaussian { mean, log_std, free: None }, leaves)
 }
 
 fn decoder(case: &Case, kind: DeviceKind) -> Dist {
@@ -27,7 +27,8 @@ fn decoder(case: &Case, kind: DeviceKind) -> Dist {
     if case.has("in.dec_logits") {
         return Dist::categorical(case.tensor("in.dec_logits", &device));
     }
-    Dist::Gaussian { mean: case.tensor("in.dec_mean", &device), log_std: case.tensor("in.dec_log_std", &device) }
+    let (mean, log_std) = (case.tensor("in.dec_mean", &device), case.tensor("in.dec_log_std", &device));
+    Dist::Gaussian { mean, log_std, free: None }
 }
 
 fn check(case: &Case, kinds: &[(&str, ConfidenceKind)]) {

@@ -21,7 +21,7 @@ fn check(name: &str) {
             let mean = leaf(case.tensor("param.mean", &device));
             let log_std = leaf(case.tensor::<1>("param.log_std", &device).unsqueeze());
             let leaves = vec![("grad.mean", mean.clone()), ("grad.log_std", log_std.clone())];
-            (Dist::Gaussian { mean, log_std }, leaves)
+            (Dist::Gaussian { mean, log_std, free: None }, leaves)
         };
         let raw = case.f32s("in.advantages");
         let mut normalized = raw.clone();

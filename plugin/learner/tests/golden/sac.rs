@@ -118,7 +118,7 @@ impl Continuous {
     /// Checks the policy's outputs for the next states, and the critics' for the batch, before anything is trained.
     fn check_values(&self, nets: &SacNets, batch: &SacBatch, alpha: f64) {
         let (case, device) = (&self.case, self.kind.plain());
-        let Dist::Gaussian { mean, log_std } = nets.actor.forward(batch.next_inputs.clone()) else {
+        let Dist::Gaussian { mean, log_std, .. } = nets.actor.forward(batch.next_inputs.clone()) else {
             panic!("continuous")
         };
         let draw = SquashedGaussian::unit(mean, log_std, &device).draw(self.noise("in.noise_next"), LogProbForm::Eps);

@@ -70,6 +70,7 @@ impl Variant<'_> {
         let prior = |name: &str| Dist::Gaussian {
             mean: case.tensor(&format!("in.{name}_mean"), &device),
             log_std: case.tensor(&format!("in.{name}_log_std"), &device),
+            free: None,
         };
         SacBatch {
             inputs: case.tensor("in.obs", &device),

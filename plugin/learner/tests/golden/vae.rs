@@ -168,7 +168,7 @@ impl<'a> Run<'a> {
             case.check("out.enc_feature", &host(summary));
         }
         let posterior = nets.encoder.forward(states, encoded.clone(), self.steps).expect("they fit");
-        if let Dist::Gaussian { mean, log_std } = posterior {
+        if let Dist::Gaussian { mean, log_std, .. } = posterior {
             case.check("out.enc_mean", &host(mean.clone()));
             case.check("out.enc_log_std", &host(log_std.clone()));
             case.check("out.latent", &host(mean + noise.clone() * log_std.exp()));

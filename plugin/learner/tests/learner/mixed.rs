@@ -111,7 +111,7 @@ fn ppo_learns_every_part_of_the_action() {
 
 #[test]
 fn an_illegal_option_is_never_taken_and_the_others_learn() {
-    let legal = [true, false, true, true, true];
+    let legal = [true, false, true, true, true, true];
     let mut learner = ppo();
     for number in 0..40 {
         let rollout = rollout(&learner, &legal, number);
@@ -123,7 +123,7 @@ fn an_illegal_option_is_never_taken_and_the_others_learn() {
     let last = mean(&rollout(&learner, &legal, 999).rewards);
     assert!((2.1..2.75).contains(&last), "{last}");
     let mut wrong = rollout(&learner, &[], 3);
-    wrong.legal = [true, false, true, true, true].repeat(STEPS * ENVS);
+    wrong.legal = legal.repeat(STEPS * ENVS);
     let text = learner.update(&wrong).expect_err("a forbidden option was taken").to_string();
     assert!(text.contains("which its mask forbids"), "{text}");
 }
@@ -232,4 +232,38 @@ fn what_does_not_fit_is_refused() {
     options[2 * 5 + 1] = 2;
     let text = ppo().update(&wrong).expect_err("there is no option 2").to_string();
     assert!(text.contains("row 5: choice 1 is 2 of 2 options"), "{text}");
+}
+
+#[test]
+fn nothing_is_learned_from_rows_whose_action_is_held() {
+    // In every other row the game holds an action: its options are the only legal ones, and its number is none of the
+    // agent's.
+    let mut learner = ppo();
+    let mut played = rollout(&learner, &[true; 6], 1);
+    let Actions::Mixed { options, values, .. } = &mut played.actions else { panic!("choices and a number") };
+    for row in (0..STEPS * ENVS).step_by(2) {
+        let taken = [options[row * 2] as usize, 3 + options[row * 2 + 1] as usize];
+        for (at, legal) in played.legal[row * 6..(row + 1) * 6].iter_mut().enumerate() {
+            *legal = taken.contains(&at);
+        }
+        played.log_probs[row] = 0.0;
+        values[row] = 0.5;
+    }
+    let mut others = played.clone();
+    let Actions::Mixed { values, .. } = &mut others.actions else { panic!("choices and a number") };
+    values.iter_mut().step_by(2).for_each(|held| *held = -0.9);
+    let mut twin = ppo();
+    let [one, other] = [(&mut learner, &played), (&mut twin, &others)].map(|(learner, rollout)| {
+        learner.update(rollout).expect("finite");
+        learner.policy().forward(&[], &observations(8, 3), 8).expect("finite")
+    });
+    assert_eq!(one, other, "the held number does not matter");
+    // What is free is learned from.
+    let Actions::Mixed { values, .. } = &mut others.actions else { panic!("choices and a number") };
+    values.iter_mut().skip(1).step_by(2).for_each(|number| *number = -0.9);
+    twin.update(&others).expect("finite");
+    learner.update(&played).expect("finite");
+    let [one, other] =
+        [&learner, &twin].map(|learner| learner.policy().forward(&[], &observations(8, 3), 8).expect("finite").head);
+    assert_ne!(one, other);
 }

@@ -209,6 +209,7 @@ fn minibatch(rows: usize) -> Minibatch {
         recall: None,
         left: None,
         logit_offsets: None,
+        free: None,
         inputs: NetInput::Images {
             z: None,
             pixels: Tensor::from_data(TensorData::new(pixels, [rows, 1, SHAPE.height, SHAPE.width]), &device),

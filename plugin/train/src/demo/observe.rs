@@ -304,19 +304,23 @@ impl ReplayWorld {
 }
 
 /// Adds the mask of a tick to those of the ticks before it. Without a mask every action is legal. People may press what
-/// is illegal, and the recorded action has to be a possible one for a learner.
+/// is illegal, and the recorded action has to be a possible one for a learner: numbers that differ from those that an
+/// earlier decision holds are a decision.
 fn push_mask(legal: &mut Vec<bool>, tick: usize, mask: Option<&LegalActions>, space: &ActionSpace, replay: &Replay) {
-    let options = space.options();
-    if options == 0 || (mask.is_none() && legal.is_empty()) {
+    let width = space.mask_width();
+    if mask.is_none() && legal.is_empty() {
         return;
     }
-    legal.resize(tick * options, true);
-    legal.extend(mask.iter().flat_map(|mask| mask.mask()));
-    legal.resize((tick + 1) * options, true);
+    legal.resize(tick * width, true);
+    legal.extend(mask.iter().flat_map(|mask| mask.entries(space)));
+    legal.resize((tick + 1) * width, true);
     let Some(action) = replay.episode().actions.get(tick) else { return };
     for (at, &option) in space.choices().ranges().zip(action.options()) {
-        if let Some(is_legal) = legal.get_mut(tick * options + at.start + option as usize) {
+        if let Some(is_legal) = legal.get_mut(tick * width + at.start + option as usize) {
             *is_legal = true;
         }
+    }
+    if let (Some(is_held), true) = (legal.last_mut(), space.numbers() > 0) {
+        *is_held |= mask.is_some_and(|mask| !mask.allows_numbers(action.numbers()));
     }
 }

@@ -45,7 +45,8 @@ fn demonstrated(evidence: &Evidence, action: u32) -> Option<f64> {
 
 fn forbidden(evidence: &Evidence) -> Option<LearningFinding> {
     let masks = || {
-        evidence.played.iter().flat_map(|played| &played.episodes).flat_map(|episode: &PlayedEpisode| &episode.masks)
+        let episodes = evidence.played.iter().flat_map(|played| &played.episodes);
+        episodes.flat_map(|episode: &PlayedEpisode| &episode.masks).filter(|mask| !mask.is_empty())
     };
     let ticks = masks().count();
     let actions = masks().next().map_or(0, Vec::len);

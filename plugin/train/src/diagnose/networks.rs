@@ -195,7 +195,7 @@ mod tests {
     fn output(head: Vec<f32>) -> PolicyOutput {
         let values = vec![0.0; head.len() / 2];
         let (space, log_std, memory) = (ActionSpace::Discrete(2), Vec::new(), Vec::new());
-        PolicyOutput { space, squashed: false, head, log_std, values, memory }
+        PolicyOutput { space, squashed: false, head, log_std, values, memory, held: Vec::new() }
     }
 
     #[test]

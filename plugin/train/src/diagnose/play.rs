@@ -7,7 +7,7 @@ use bevy_playbot::{
     demo::{file::DemoEpisode, recorder, replay::Replay},
     engine::{Renewal, TickSchedules, tick_world},
     episode::{Episode, EpisodeEnd},
-    legal::LegalActions,
+    legal::{DecisionPeriod, LegalActions},
     level::LevelQueue,
     observation::Observation,
     reward::Reward,
@@ -216,7 +216,10 @@ fn note(world: &mut World) {
             running.actions.push(action.0.clone());
             running.rewards.push(reward.get());
             if let Some(legal) = world.get::<LegalActions>(entity) {
-                running.masks.push(legal.mask().to_vec());
+                // Where an earlier decision holds, the mask says nothing about the game.
+                let decides =
+                    world.get::<DecisionPeriod>(entity).is_none_or(|period| period.decides_in(episode.tick - 1));
+                running.masks.push(if decides { legal.mask().to_vec() } else { Vec::new() });
             }
             watched.ticks += 1;
             if episode.end().is_some() {

@@ -225,8 +225,8 @@ fn label_all(world: &mut World, asking: &mut Asking) -> Result<(), String> {
         }
         is_masked |= mask.is_some();
         match mask {
-            Some(mask) => legal.extend_from_slice(mask.mask()),
-            None => legal.resize(legal.len() + spec.action_space.options(), true),
+            Some(mask) => legal.extend(mask.entries(&spec.action_space)),
+            None => legal.resize(legal.len() + spec.action_space.mask_width(), true),
         }
         let memory = agent.get::<AgentMemory>().filter(|memory| memory.0.len() == width && episode.tick > 0);
         memories.extend(memory.map_or(&[][..], |memory| &memory.0));
@@ -271,7 +271,7 @@ fn single(
     let mut steps = LabelledSteps::empty(spec);
     steps.obs.push(seen.row(row, spec.obs.numbers()))?;
     steps.actions.push(label)?;
-    let options = spec.action_space.options();
-    steps.legal = legal.get(row * options..(row + 1) * options).unwrap_or_default().to_vec();
+    let width = spec.action_space.mask_width();
+    steps.legal = legal.get(row * width..(row + 1) * width).unwrap_or_default().to_vec();
     Ok(steps)
 }

@@ -26,15 +26,31 @@ fn dist(rng: &mut ChaCha8Rng, kind: u8, n: usize, dim: usize, device: &Device) -
     match kind {
         0 => Dist::categorical(head),
         3 => Dist::Joint(vec![dist(rng, 0, n, dim, device), dist(rng, 0, n, 3, device), dist(rng, 1, n, 2, device)]),
-        _ => Dist::Gaussian { mean: head, log_std: matrix(numbers(rng, std_rows * dim, 0.3), std_rows, dim, device) },
+        _ => {
+            let log_std = matrix(numbers(rng, std_rows * dim, 0.3), std_rows, dim, device);
+            // In some rows of half of them the numbers are held.
+            let is_held = rng.random::<bool>();
+            let of_row = |_| if is_held && rng.random_ratio(1, 3) { 0.0 } else { 1.0 };
+            let free = is_held.then(|| vector((0..n).map(of_row).collect(), device));
+            Dist::Gaussian { mean: head, log_std, free }
+        }
+    }
+}
+
+/// Returns the rows whose numbers are held.
+fn free(dist: &Dist) -> Option<&Tensor<1>> {
+    match dist {
+        Dist::Categorical { .. } => None,
+        Dist::Gaussian { free, .. } => free.as_ref(),
+        Dist::Joint(parts) => parts.iter().find_map(free),
     }
 }
 
 fn tracked(dist: Dist) -> Dist {
     match dist {
         Dist::Categorical { log_probs } => Dist::Categorical { log_probs: log_probs.require_grad() },
-        Dist::Gaussian { mean, log_std } => {
-            Dist::Gaussian { mean: mean.require_grad(), log_std: log_std.require_grad() }
+        Dist::Gaussian { mean, log_std, free } => {
+            Dist::Gaussian { mean: mean.require_grad(), log_std: log_std.require_grad(), free }
         }
         Dist::Joint(parts) => Dist::Joint(parts.into_iter().map(tracked).collect()),
     }
@@ -46,7 +62,7 @@ fn gradients(loss: Tensor<1>, dist: &Dist, values: &Tensor<1>) -> Vec<Option<Vec
         let of = |grad: Option<Tensor<2>>| grad.map(|grad| host(grad).expect("readable"));
         match dist {
             Dist::Categorical { log_probs } => vec![of(log_probs.grad(grads))],
-            Dist::Gaussian { mean, log_std } => vec![of(mean.grad(grads)), of(log_std.grad(grads))],
+            Dist::Gaussian { mean, log_std, .. } => vec![of(mean.grad(grads)), of(log_std.grad(grads))],
             Dist::Joint(parts) => parts.iter().flat_map(|part| of_parts(part, grads)).collect(),
         }
     }
@@ -68,7 +84,7 @@ fn loss_metrics_and_gradient_are_those_of_the_tensors() {
         let (kind, n, dim) = ((case % 4) as u8, rng.random_range(1..150), rng.random_range(1..17));
         let [penalised, from_policy, clip_value] = [(); 3].map(|()| rng.random::<bool>());
         let policy = tracked(dist(&mut rng, kind, n, dim, &device.clone().autodiff()));
-        let decoder = dist(&mut rng, kind, n, dim, &device);
+        let decoder = dist(&mut rng, kind, n, dim, &device).with_free(free(&policy));
         let actions = match kind {
             0 => Actions::Discrete((0..n).map(|i| (i % dim) as u32).collect()),
             3 => Actions::Mixed {
@@ -91,6 +107,7 @@ fn loss_metrics_and_gradient_are_those_of_the_tensors() {
             recall: None,
             left: None,
             logit_offsets: None,
+            free: None,
             inputs: NetInput::Joined(matrix(vec![0.0], 1, 1, &device)),
             ppo: PpoBatch { actions, old_log_probs: vector(old_log_probs, &device), advantages, old_values, returns },
             intrinsic_returns: None,
@@ -157,6 +174,7 @@ fn penalised(
         recall: None,
         left: None,
         logit_offsets: offsets.cloned(),
+        free: None,
         inputs: NetInput::Joined(matrix(vec![0.0], 1, 1, &device)),
         ppo: PpoBatch {
             actions: ActionBatch::new(&Actions::Discrete(actions), &device),
@@ -221,6 +239,7 @@ fn actions_of_the_other_kind_are_refused() {
         recall: None,
         left: None,
         logit_offsets: None,
+        free: None,
         inputs: NetInput::Joined(matrix(vec![0.0], 1, 1, &device)),
         ppo: PpoBatch {
             actions,
