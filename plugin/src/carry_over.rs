@@ -254,6 +254,7 @@ mod tests {
                 "Recording",
                 "RedrawsIllegal",
                 "Replay",
+                "SkillMemory",
                 "StateHash",
                 "VectorSensor",
             ]

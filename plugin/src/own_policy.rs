@@ -10,7 +10,7 @@ use crate::{
     observation::Observation,
     policy::{ActionDraw, AgentMemory, misfit},
     policy_batch::PolicyBatch,
-    skill_prior::{ActiveSkill, SkillPrior},
+    skill_prior::{ActiveSkill, SkillMemory, SkillPrior},
     streams::AgentStreams,
     vision::ImageSensor,
 };
@@ -38,7 +38,7 @@ pub(crate) fn run_own_policies(
     mut agents: Query<(
         (&Agent, &Control, &Episode, &OwnPolicy),
         (&Observation, Option<&ImageSensor>, Option<&LegalActions>),
-        (&mut ActiveSkill, &mut AgentMemory),
+        (&mut ActiveSkill, &mut SkillMemory, &mut AgentMemory),
         &mut AgentStreams,
         &mut Action,
     )>,
@@ -46,7 +46,7 @@ pub(crate) fn run_own_policies(
     mut faults: ResMut<Faults>,
 ) {
     for &entity in order.entities() {
-        let Ok(((agent, control, episode, own), seen, (mut skill, mut memory), mut streams, mut action)) =
+        let Ok(((agent, control, episode, own), seen, (mut skill, mut past, mut memory), mut streams, mut action)) =
             agents.get_mut(entity)
         else {
             continue;
@@ -55,7 +55,7 @@ pub(crate) fn run_own_policies(
             continue;
         }
         let (observation, sensor, legal) = seen;
-        if let Err(why) = draw_skill(own, observation, &mut skill, &mut streams) {
+        if let Err(why) = draw_skill(own, observation, (&mut skill, &mut past), &mut streams) {
             return faults.report(format!("{}: the skill prior cannot draw: {why}", episode.moment(agent)));
         }
         if let Some(why) = misfit(&own.policy, agent, observation, sensor, &skill) {
@@ -89,7 +89,7 @@ pub(crate) fn run_own_policies(
 fn draw_skill(
     own: &OwnPolicy,
     observation: &Observation,
-    skill: &mut ActiveSkill,
+    (skill, memory): (&mut ActiveSkill, &mut SkillMemory),
     streams: &mut AgentStreams,
 ) -> Result<(), String> {
     let Some(SkillPrior { prior, skill_interval, draw }) = own.skills.as_ref().filter(|_| skill.ticks_left == 0) else {
@@ -97,9 +97,11 @@ fn draw_skill(
     };
     let mut seen = Observations::empty(&own.policy.observation());
     observation.push_to(&mut seen);
-    let drawn =
-        prior.sample(&seen, 1, *draw, &mut |_| normal(&mut streams.skill)).map_err(|error| error.to_string())?;
-    *skill = ActiveSkill { z: drawn, ticks_left: *skill_interval };
+    let before = if memory.now.len() == prior.memory() { std::mem::take(&mut memory.now) } else { Vec::new() };
+    let drawn = prior.sample_remembering(&seen, &before, 1, *draw, &mut |_| normal(&mut streams.skill));
+    let (z, now) = drawn.map_err(|error| error.to_string())?;
+    *memory = SkillMemory { before, now };
+    *skill = ActiveSkill { z, ticks_left: *skill_interval };
     Ok(())
 }
 

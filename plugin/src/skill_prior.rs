@@ -95,6 +95,24 @@ impl ActiveSkill {
     }
 }
 
+/// What a policy over skills remembers of the present episode: that of SPiRL with `ppo.memory`. Empty at first, and for a
+/// prior without memory.
+#[derive(Component, Clone, Debug, Default, PartialEq, Serialize, Deserialize, Reflect)]
+#[reflect(Component, CarryComponent)]
+pub struct SkillMemory {
+    /// Before the last draw of a skill.
+    pub before: Vec<f32>,
+    /// After it.
+    pub now: Vec<f32>,
+}
+
+impl SkillMemory {
+    /// Returns whether it holds nothing.
+    pub fn is_empty(&self) -> bool {
+        self.now.is_empty()
+    }
+}
+
 /// A region of skills with a name: all within a distance of its middle.
 ///
 /// ```
@@ -135,15 +153,21 @@ impl NamedSkill {
 
 /// Adds the components of skills to every agent.
 pub(crate) fn plugin(app: &mut App) {
-    app.register_required_components::<Agent, ActiveSkill>();
+    app.register_required_components::<Agent, ActiveSkill>().register_required_components::<Agent, SkillMemory>();
 }
 
 /// Ends skills with their episode: the first tick of the next episode draws anew, under any
 /// control.
-pub(crate) fn end_skills(mut agents: Query<(&Episode, &mut ActiveSkill)>) {
-    for (episode, mut skill) in &mut agents {
-        if episode.is_running() && episode.tick == 0 && skill.is_counted() {
+pub(crate) fn end_skills(mut agents: Query<(&Episode, &mut ActiveSkill, &mut SkillMemory)>) {
+    for (episode, mut skill, mut memory) in &mut agents {
+        if !episode.is_running() || episode.tick > 0 {
+            continue;
+        }
+        if skill.is_counted() {
             skill.ticks_left = 0;
+        }
+        if !memory.is_empty() {
+            *memory = SkillMemory::default();
         }
     }
 }
@@ -152,15 +176,21 @@ pub(crate) fn end_skills(mut agents: Query<(&Episode, &mut ActiveSkill)>) {
 pub fn draw_skills(
     prior: Res<SkillPrior>,
     order: Res<AgentOrder>,
-    mut agents: Query<(&Agent, &Control, &Episode, &Observation, &mut ActiveSkill, &mut AgentStreams)>,
+    mut agents: Query<(
+        (&Agent, &Control, &Episode, &Observation),
+        &mut ActiveSkill,
+        Option<&mut SkillMemory>,
+        &mut AgentStreams,
+    )>,
     sensors: Query<&ImageSensor>,
     mut faults: ResMut<Faults>,
 ) {
     // A prior that ignores observations takes any kind.
     let kind = prior.prior.observation().unwrap_or(ObsKind::Vector(0));
     let (mut batch, mut drawing) = (Observations::empty(&kind), Vec::new());
+    let (width, mut memories) = (prior.prior.memory(), Vec::new());
     for &entity in order.entities() {
-        let Ok((agent, control, episode, observation, skill, _)) = agents.get(entity) else { continue };
+        let Ok(((agent, control, episode, observation), skill, memory, _)) = agents.get(entity) else { continue };
         if *control == Control::Policy && episode.is_running() && skill.ticks_left == 0 {
             if let Some(why) = misfit(&prior.prior, agent, observation, sensors.get(entity).ok()) {
                 faults.report(why);
@@ -168,6 +198,10 @@ pub fn draw_skills(
             }
             observation.push_to(&mut batch);
             drawing.push(entity);
+            // Nothing is remembered of an earlier episode, or of another prior.
+            let now = memory.map(|memory| &memory.now).filter(|now| episode.tick > 0 && now.len() == width);
+            memories.extend_from_slice(now.map_or(&[], |now| now));
+            memories.resize(drawing.len() * width, 0.0);
         }
     }
     if drawing.is_empty() {
@@ -177,13 +211,18 @@ pub fn draw_skills(
         Ok((.., mut streams)) => playbot_learner::rng::normal(&mut streams.skill),
         Err(_) => 0.0,
     };
-    let skills = match prior.prior.sample(&batch, drawing.len(), prior.draw, &mut normal) {
-        Ok(skills) => skills,
+    let drawn = prior.prior.sample_remembering(&batch, &memories, drawing.len(), prior.draw, &mut normal);
+    let (skills, remembered) = match drawn {
+        Ok(drawn) => drawn,
         Err(error) => return faults.report(format!("the skill prior cannot draw: {error}")),
     };
     let latent = skills.len() / drawing.len();
     for (row, &entity) in drawing.iter().enumerate() {
-        let Ok((.., mut skill, _)) = agents.get_mut(entity) else { continue };
+        let Ok((_, mut skill, memory, _)) = agents.get_mut(entity) else { continue };
+        if let (Some(mut memory), 1..) = (memory, width) {
+            let of_agent = row * width..(row + 1) * width;
+            (memory.before, memory.now) = (memories[of_agent.clone()].to_vec(), remembered[of_agent].to_vec());
+        }
         skill.z.clear();
         skill.z.extend_from_slice(&skills[row * latent..(row + 1) * latent]);
         skill.ticks_left = prior.skill_interval;

@@ -49,8 +49,9 @@ fn works() -> Vec<Work> {
         saved: ("run/checkpoints/step-", "summary.json"),
     };
     let with = " --skills skills";
+    let remembering = " --skills skills --set ppo.memory=Gru(hidden:8)";
     let trainings =
-        [("score-ppo", with), ("ppo", ""), ("score-sac", with), ("sac", ""), ("spirl-ppo", with), ("rlpd", "")];
+        [("score-ppo", with), ("ppo", ""), ("score-sac", with), ("sac", ""), ("spirl-ppo", remembering), ("rlpd", "")];
     let work = |begin: &str, go_on: &str, saved| Work {
         begin: begin.to_owned(),
         go_on: if go_on.is_empty() { String::new() } else { format!("{begin} {go_on}") },

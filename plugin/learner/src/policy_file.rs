@@ -278,7 +278,9 @@ impl SkillsShape {
             Some(shape) => {
                 let spec = PolicySpec { latent: 0, action_space: ActionSpace::Continuous(latent), ..*policy };
                 let prior = shape.stored(&spec, file, "prior", &plain)?;
-                let widths = InputWidths { obs_dim: obs_dim(shape), latent: 0 };
+                let seen = obs_dim(shape);
+                let remembered = shape.memory.map_or(0, |memory| memory.width(seen));
+                let widths = InputWidths { obs_dim: seen.saturating_add(remembered), latent: 0 };
                 widths.check(file, "prior", shape.net.input_widths())?;
                 Some(prior)
             }

@@ -274,7 +274,9 @@ pub fn is_off<T: Default + PartialEq>(value: &T) -> bool {
 /// A value of a setting can be written.
 pub fn text(value: &impl Serialize) -> String {
     let config = ron::ser::PrettyConfig::new().compact_arrays(true).compact_structs(true);
-    ron::ser::to_string_pretty(value, config).expect("settings are numbers, names and lists of them")
+    let text = ron::ser::to_string_pretty(value, config).expect("settings are numbers, names and lists of them");
+    // A kind that is called as `None` of an option is marked by RON, and is read without the mark, too.
+    if text == "r#None" { "None".to_owned() } else { text }
 }
 
 /// Makes a struct of settings from a table. A row has, in this order:

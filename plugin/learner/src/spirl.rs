@@ -61,7 +61,7 @@ impl SpirlLearner {
         device: DeviceKind,
     ) -> Result<Self, LearnError> {
         check(&config, score, ppo.time_limit)?;
-        ppo.refuse_memory_and_curiosity("spirl")?;
+        ppo.refuse_curiosity("spirl")?;
         let below = PpoLearner::below(&config, &ppo, score, model, seed, device)?;
         let (gamma, ent_coef) = (ppo.gamma.powi(score.skill_interval as i32), 0.0);
         let ppo = PpoConfig { gamma, ent_coef, ..ppo };
@@ -136,7 +136,11 @@ impl PpoLearner {
         if !config.learn_decoder {
             return Ok(None);
         }
-        ppo.refuse_memory_and_curiosity("spirl")?;
+        ppo.refuse_curiosity("spirl")?;
+        ppo.refuse_memory(
+            "is that of the policy over skills, and a decoder that learns below it has none: leave it `None`, \
+                           or set `spirl.learn_decoder` to false",
+        )?;
         learner().map(Some)
     }
 }

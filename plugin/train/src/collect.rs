@@ -16,7 +16,7 @@ use bevy_playbot::{
     observation::Observation,
     policy::{ActionDraw, ActivePolicy, AgentMemory, Decision},
     reward::Reward,
-    skill_prior::{ActiveSkill, SkillPrior},
+    skill_prior::{ActiveSkill, SkillMemory, SkillPrior},
     state_hash::StateHash,
     streams::AgentStreams,
     systems::PlaybotSystems,
@@ -295,11 +295,12 @@ fn bootstrap_values(world: &mut World, policy: &Policy, rollout: &mut Rollout) -
         .collect();
     let kind = rollout.obs_kind;
     let (mut skills, mut left, mut observations) = (Vec::new(), Vec::new(), Observations::empty(&kind));
-    let (width, mut memory) = (policy.memory(), Vec::new());
+    let (width, mut memory) = (memory_width(world, policy), Vec::new());
     for &row in &running {
         push_state(world, entities[row], &mut skills, &mut left, &mut observations);
-        push_memory(world, entities[row], width, &mut memory);
+        push_memory(world, entities[row], policy, &mut memory);
     }
+    // A policy without memory ignores that of a policy over skills.
     let values = policy.values_remembering(&skills, &left, &memory, &observations, running.len())?;
     let latent = rollout.latent;
     rollout.next_values = vec![0.0; entities.len()];
@@ -346,7 +347,10 @@ fn collect_tick(world: &mut World) {
         }
         let tick = tick_of(world, &entities, AgentsTick::new(&policy, &kind))?;
         collecting.rollout.push_left(world.resource::<PolicyBatch>().left());
-        collecting.rollout.push_memory(world.resource::<PolicyBatch>().memory());
+        match policy.memory() {
+            0 => push_skill_memories(world, &entities, &mut collecting.rollout),
+            _ => collecting.rollout.push_memory(world.resource::<PolicyBatch>().memory()),
+        }
         push_tick(&mut collecting.rollout, &tick, &final_values, &cut)?;
         collecting.rollout.push_legal(world.resource::<PolicyBatch>().legal());
         Ok::<(), LearnError>(())
@@ -483,7 +487,7 @@ pub(crate) fn cut_episodes(
     for (i, &row) in cut.agents.iter().enumerate() {
         let skill_from = cut.z.len();
         push_state(world, entities[row], &mut cut.z, &mut cut.left, &mut cut.obs);
-        push_memory(world, entities[row], policy.memory(), &mut cut.memory);
+        push_memory(world, entities[row], policy, &mut cut.memory);
         let held = world.get::<ActiveSkill>(entities[row]).is_some_and(|skill| skill.ticks_left > 0);
         let streams = world.get::<AgentStreams>(entities[row]);
         if let (false, Some(prior), Some(streams)) = (held, world.get_resource::<SkillPrior>(), streams) {
@@ -519,13 +523,44 @@ pub(crate) fn push_state(
     }
 }
 
-/// Adds what an agent's policy, which remembers `width` numbers, remembers of its present episode.
-fn push_memory(world: &World, entity: Entity, width: usize, all: &mut Vec<f32>) {
+/// Returns how many numbers are remembered: by the policy, or by a policy over skills.
+fn memory_width(world: &World, policy: &Policy) -> usize {
+    let of_skills = world.get_resource::<SkillPrior>().map_or(0, |prior| prior.prior.memory());
+    policy.memory().max(of_skills)
+}
+
+/// Adds what an agent's policy remembers of its present episode, or the policy over skills in its place: before a skill
+/// that was just drawn, since its state is the one in which it was drawn.
+fn push_memory(world: &World, entity: Entity, policy: &Policy, all: &mut Vec<f32>) {
+    let width = memory_width(world, policy);
     let begun = world.get::<Episode>(entity).is_some_and(|episode| episode.tick > 0);
-    let memory = world.get::<AgentMemory>(entity).filter(|memory| begun && memory.0.len() == width);
+    let memory = match policy.memory() {
+        0 => world.get::<SkillMemory>(entity).map(|memory| match is_just_drawn(world, entity) {
+            true => &memory.before,
+            false => &memory.now,
+        }),
+        _ => world.get::<AgentMemory>(entity).map(|memory| &memory.0),
+    };
     let end = all.len() + width;
-    all.extend_from_slice(memory.map_or(&[], |memory| &memory.0));
+    all.extend_from_slice(memory.filter(|memory| begun && memory.len() == width).map_or(&[], |memory| memory));
     all.resize(end, 0.0);
+}
+
+fn is_just_drawn(world: &World, entity: Entity) -> bool {
+    let interval = world.get_resource::<SkillPrior>().map(|prior| prior.skill_interval);
+    interval == world.get::<ActiveSkill>(entity).map(|skill| skill.ticks_left)
+}
+
+/// Adds what the policy over skills remembered before the last draw of each agent, if it has a memory.
+fn push_skill_memories(world: &World, entities: &[Entity], rollout: &mut Rollout) {
+    let width = world.get_resource::<SkillPrior>().map_or(0, |prior| prior.prior.memory());
+    let mut all = Vec::with_capacity(entities.len() * width);
+    for (row, &entity) in entities.iter().enumerate() {
+        let memory = world.get::<SkillMemory>(entity).filter(|memory| memory.before.len() == width);
+        all.extend_from_slice(memory.map_or(&[], |memory| &memory.before));
+        all.resize((row + 1) * width, 0.0);
+    }
+    rollout.push_memory(&all);
 }
 
 /// Returns the masks of agents in their present states, one after the other; nothing if no agent has one. All actions
@@ -560,6 +595,9 @@ pub struct ArenaState {
     skill_ticks_left: u32,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     memory: Vec<f32>,
+    /// What a policy over skills remembers.
+    #[serde(default, skip_serializing_if = "SkillMemory::is_empty")]
+    skill_memory: SkillMemory,
     streams: [RngState; 3],
 }
 
@@ -599,18 +637,23 @@ pub enum RestoreError {
 pub fn save_arenas(collector: &mut Collector) -> Vec<ArenaState> {
     let agents = collector.agents().to_vec();
     let world = collector.world_mut();
-    let mut query =
-        world.query::<(&Agent, &Episode, &ActionLog, &ActiveSkill, &AgentStreams, &StateHash, &AgentMemory)>();
+    let mut query = world.query::<(
+        (&Agent, &Episode, &ActionLog, &StateHash),
+        (&ActiveSkill, &SkillMemory),
+        &AgentStreams,
+        &AgentMemory,
+    )>();
     agents
         .iter()
         .filter_map(|&agent| query.get(world, agent).ok())
-        .map(|(agent, episode, log, skill, streams, hash, memory)| ArenaState {
+        .map(|((agent, episode, log, hash), (skill, skill_memory), streams, memory)| ArenaState {
             level: episode.is_running().then_some(episode.level),
             actions: collect_actions(&agent.actions, &log.0),
             state_hash: hash.0,
             skill: skill.z.clone(),
             skill_ticks_left: skill.ticks_left,
             memory: memory.0.clone(),
+            skill_memory: skill_memory.clone(),
             streams: [&streams.level, &streams.action, &streams.skill].map(RngState::of),
         })
         .collect()
@@ -659,7 +702,8 @@ pub fn restore_arenas(collector: &mut Collector, saved: &[ArenaState]) -> Result
         let streams = AgentStreams::restored(level.restore()?, action.restore()?, skill.restore()?);
         let active = ActiveSkill { z: state.skill.clone(), ticks_left: state.skill_ticks_left };
         let log = ActionLog((0..state.actions.len()).filter_map(|tick| state.actions.get(tick)).collect());
-        entity.insert((Control::Policy, streams, active, log, AgentMemory(state.memory.clone())));
+        let memories = (AgentMemory(state.memory.clone()), state.skill_memory.clone());
+        entity.insert((Control::Policy, streams, active, log, memories));
         if let Some(queue) = &queues[row] {
             entity.insert(queue.clone());
         }

@@ -27,11 +27,11 @@ const NETWORKS: &[Reader] =
 /// Those of them whose policy is over actions.
 const OVER_ACTIONS: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO, Reader::SPIRL_PPO_DECODER, Reader::SPIRL_SAC_DECODER];
 
-/// Those of them whose policy chooses an action in each tick, which may remember and be curious.
+/// Those of them whose policy chooses an action in each tick, which may be curious.
 const IN_EACH_TICK: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO];
 
-/// Readers whose policy acts in each tick itself, and not through skills.
-const REMEMBERING: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO, Reader::IMITATION];
+/// Those of them whose policy may remember.
+const REMEMBERING: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO, Reader::SPIRL_PPO, Reader::IMITATION];
 
 settings! {
     /// Hyperparameters of PPO. The defaults are those of the paper's CoinRun runs, with 64 environments in mind.
@@ -85,8 +85,9 @@ settings! {
     /// order is without effect. `Flat` reads the slots as other values. A copied decoder brings its own. Without effect
     /// on observations without sets.
     entities: EntityKind = EntityKind::default(), in Range::COUNT, by NETWORKS, off "settings::is_off";
-    /// The memory of actor and critic. A policy that starts as a copy of the decoder has one that is without effect at
-    /// first. `sequence` ticks are trained together, and `burn_in` is explained with them.
+    /// The memory of actor and critic. A policy that starts as a copy of the decoder or of the prior has one that is
+    /// without effect at first. `sequence` ticks are trained together, and `burn_in` is explained with them; to a policy
+    /// over skills a tick is a skill.
     memory: MemoryKind = MemoryKind::None, in Range::COUNT, by REMEMBERING, such as "Gru(hidden: 128)", off "settings::is_off";
     /// Hidden layers of actor and critic. A copied decoder brings its own.
     hidden: Vec<usize> = vec![200, 200], in Range::COUNT, by NETWORKS;
@@ -178,21 +179,26 @@ impl PpoConfig {
         Err(SettingError::new("ppo.memory", text).into())
     }
 
-    /// Checks that neither memory nor an intrinsic reward is wanted, for a learner that has neither.
+    /// Refuses an intrinsic reward, for a learner that has none.
     ///
     /// # Errors
-    /// [`LearnError::Setting`] names the one that is.
-    pub(crate) fn refuse_memory_and_curiosity(&self, learner: &str) -> Result<(), LearnError> {
-        let wanted = [
-            ("ppo.memory", "None", self.memory != MemoryKind::None),
-            ("ppo.curiosity", "Off", self.curiosity != Curiosity::Off),
-        ];
-        match wanted.into_iter().find(|(.., is_wanted)| *is_wanted) {
-            None => Ok(()),
-            Some((path, off, _)) => {
-                let why = format!("is for ppo and score-ppo, not for {learner}: leave it `{off}`");
-                Err(SettingError::new(path, why).into())
-            }
+    /// [`LearnError::Setting`] if it is wanted.
+    pub(crate) fn refuse_curiosity(&self, learner: &str) -> Result<(), LearnError> {
+        if self.curiosity == Curiosity::Off {
+            return Ok(());
+        }
+        let why = format!("is for ppo and score-ppo, not for {learner}: leave it `Off`");
+        Err(SettingError::new("ppo.curiosity", why).into())
+    }
+
+    /// Refuses a memory, for a policy that decides below another one.
+    ///
+    /// # Errors
+    /// [`LearnError::Setting`] if there is one.
+    pub(crate) fn refuse_memory(&self, why: &str) -> Result<(), LearnError> {
+        match self.memory {
+            MemoryKind::None => Ok(()),
+            _ => Err(SettingError::new("ppo.memory", why.to_owned()).into()),
         }
     }
 

@@ -5,6 +5,7 @@ use crate::{
     begin_from::{Fit, InputMap, take_moments, transplant},
     nn::{frozen, tracked},
     ppo::{PpoLearner, PpoNets, actor_shape},
+    settings,
 };
 
 /// The reason for which an untrained critic is not taken.
@@ -39,7 +40,13 @@ impl PpoLearner {
                             more inputs";
                 return Err(LearnError::Config(text.to_owned()));
             }
-            _ => return differs("another `ppo.memory`"),
+            _ => {
+                let (own, theirs) = (settings::text(&self.config.memory), settings::text(&other.config.memory));
+                return Err(LearnError::Config(format!(
+                    "its `ppo.memory` is {theirs}, and that of the new run is {own}: give it the same, with --set \
+                     'ppo.memory={theirs}'"
+                )));
+            }
         };
         let (behind, is_as_large) = inputs.behind(shape.entities.as_ref(), their_shape.entities.as_ref())?;
         let fit = Fit { inputs: &behind, latent: own.latent, memory, is_refused: None };

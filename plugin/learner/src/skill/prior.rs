@@ -3,9 +3,9 @@
 use crate::{
     LearnError, ObsKind, ObsSlice,
     device::guarded,
-    nn::frozen,
+    nn::{frozen, host, matrix},
     norm::ObsStats,
-    policy::{Actor, InputBuilder},
+    policy::{Actor, InputBuilder, Memory},
 };
 use burn::tensor::Device;
 use playbot_kernels::kept_memory::KeptWeights;
@@ -70,6 +70,11 @@ impl Prior {
         self.latent
     }
 
+    /// Returns how many numbers an agent remembers from one draw to the next; 0 without memory.
+    pub fn memory(&self) -> usize {
+        self.net.as_ref().and_then(|net| net.actor.memory.as_ref()).map_or(0, Memory::width)
+    }
+
     /// Skills for `n` raw observations, as the decoder and the policy take them: `n * latent`.
     ///
     /// `normal(row)` must return the next standard normal number of that row's own generator. It is called `latent`
@@ -86,29 +91,57 @@ impl Prior {
         draw: SkillDraw,
         normal: &mut dyn FnMut(usize) -> f32,
     ) -> Result<Vec<f32>, LearnError> {
+        self.sample_remembering(obs, &[], n, draw, normal).map(|(skills, _)| skills)
+    }
+
+    /// Does [`Self::sample`] for agents with the memories `memory`, `n * memory()`, and returns what they remember after it
+    /// beside the skills. Without any all begin anew, with zeros.
+    ///
+    /// # Errors
+    /// As [`Self::sample`], and [`LearnError::Shape`] for memories of the wrong length.
+    pub fn sample_remembering<'a>(
+        &self,
+        obs: impl Into<ObsSlice<'a>>,
+        memory: &[f32],
+        n: usize,
+        draw: SkillDraw,
+        normal: &mut dyn FnMut(usize) -> f32,
+    ) -> Result<(Vec<f32>, Vec<f32>), LearnError> {
         if n == 0 {
-            return Ok(Vec::new());
+            return Ok((Vec::new(), Vec::new()));
         }
-        let numbers = n * self.latent;
-        let (mut z, log_std) = match &self.net {
-            None => (vec![0.0; numbers], vec![0.0; numbers]),
+        let (numbers, width) = (n * self.latent, self.memory());
+        if !memory.is_empty() {
+            LearnError::check("memories of the prior", n * width, memory.len())?;
+        }
+        let (mut z, log_std, mut after) = match &self.net {
+            None => (vec![0.0; numbers], vec![0.0; numbers], Vec::new()),
             Some(PriorNet { actor, observation: kind, stats, device, kept }) => {
                 let obs = obs.into();
                 obs.check("observations of the prior", kind, n)?;
                 let inputs = InputBuilder { z: &[], latent: 0, obs, kind, stats: stats.as_deref() };
                 let pass = || {
                     let mut x = actor.join(&inputs.input(&(0..n).collect::<Vec<_>>(), device))?;
+                    let mut before = memory.to_vec();
+                    before.resize(n * width, 0.0);
                     if n == 1 {
                         // As in `Policy`: a single row would be summed in another order.
                         x = x.repeat_dim(0, 2);
+                        before.extend_from_within(..);
                     }
-                    actor.forward(x).to_host()
+                    let mut after = Vec::new();
+                    if let Some(memory) = &actor.memory {
+                        let (seen, remembered) = memory.step(x, matrix(before, n.max(2), width, device));
+                        (x, after) = (seen, host(remembered)?);
+                    }
+                    Ok((actor.forward(x).to_host()?, after))
                 };
-                let dist = kept.during(|| guarded(device, pass))?;
-                (dist.head, dist.log_std.unwrap_or_default())
+                let (dist, after) = kept.during(|| guarded(device, pass))?;
+                (dist.head, dist.log_std.unwrap_or_default(), after)
             }
         };
         z.truncate(numbers);
+        after.truncate(n * width);
         for (i, (z, s)) in z.iter_mut().zip(&log_std).enumerate() {
             if draw == SkillDraw::Sample {
                 *z += normal(i / self.latent) * libm::expf(*s);
@@ -120,6 +153,6 @@ impl Prior {
         if z.iter().any(|x| !x.is_finite()) {
             return Err(LearnError::NotFinite { tensor: "prior output".to_owned(), steps: None });
         }
-        Ok(z)
+        Ok((z, after))
     }
 }

@@ -152,7 +152,7 @@ pub(super) fn of_prior(config: &SpirlConfig, score: &ScoreConfig, kl: bool) -> S
 
 /// Fills in the log-probability of each action of a rollout under the policy that played it, and the policy's value.
 fn score_rows(rollout: &mut Rollout, policy: &Policy) -> Result<(), LearnError> {
-    let output = policy.forward(&[], &rollout.obs, rollout.rows())?;
+    let output = policy.forward_remembering(&[], &[], &rollout.memory, &rollout.obs, rollout.rows())?;
     let Actions::Continuous { dim, values } = &rollout.actions else {
         return Err(LearnError::Action("skills are vectors".to_owned()));
     };

@@ -83,6 +83,7 @@ pub(super) fn skill_rollout(
     (skills.log_probs, skills.values, skills.final_values) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
     skills.next_values = vec![0.0];
     skills.ends.next_obs.push(rollout.obs.row(0, rollout.obs_kind.numbers()))?;
+    skills.ends.next_memory = vec![0.0; rollout.memory_width()];
     Ok(SkillRollout { rows: skills, discounts, drawn_at })
 }
 
@@ -118,23 +119,33 @@ fn skill_steps(rollout: &Rollout, rewards: &[f32], env: usize, gamma: f64, skill
 }
 
 /// Adds one skill; `next` is the row of the one that is added behind it.
-fn push(skills: &mut Rollout, rollout: &Rollout, step: &SkillStep, next: Option<usize>) -> Result<(), LearnError> {
-    let width = rollout.obs_kind.numbers();
-    let EndStates { cut_obs, next_obs, .. } = &rollout.ends;
+fn push<'a>(
+    skills: &mut Rollout,
+    rollout: &'a Rollout,
+    step: &SkillStep,
+    next: Option<usize>,
+) -> Result<(), LearnError> {
+    let (width, remembered) = (rollout.obs_kind.numbers(), rollout.memory_width());
+    let EndStates { cut_obs, next_obs, cut_memory, next_memory, .. } = &rollout.ends;
     skills.obs.push(rollout.obs.row(step.row, width))?;
+    let memory_of = |all: &'a [f32], row: usize| all.get(row * remembered..(row + 1) * remembered).unwrap_or_default();
+    skills.memory.extend_from_slice(memory_of(&rollout.memory, step.row));
     skills.rewards.push(step.reward as f32);
     skills.terminated.push(step.after == After::Nothing);
     let state = match step.after {
         After::Nothing => None,
         After::Row(row) if Some(row) == next => None,
-        After::Row(row) => Some(rollout.obs.row(row, width)),
-        After::Cut(cut) => Some(cut_obs.row(cut, width)),
-        After::End(env) => Some(next_obs.row(env, width)),
+        After::Row(row) => Some((rollout.obs.row(row, width), memory_of(&rollout.memory, row))),
+        After::Cut(cut) => Some((cut_obs.row(cut, width), memory_of(cut_memory, cut))),
+        After::End(env) => Some((next_obs.row(env, width), memory_of(next_memory, env))),
     };
     skills.truncated.push(state.is_some());
     skills.steps += 1;
     match state {
-        Some(state) => skills.push_cut(0, state, &[]),
+        Some((state, memory)) => {
+            skills.ends.cut_memory.extend_from_slice(memory);
+            skills.push_cut(0, state, &[])
+        }
         None => Ok(()),
     }
 }

@@ -16,14 +16,18 @@ pub struct Rules {
     pub near: f32,
     /// Steps until an episode is cut off.
     pub limit: usize,
+    /// Steps at the beginning of an episode in which the goal is seen.
+    pub shown: usize,
     /// Reward of a step, by the distances before and after it.
     pub reward: fn(f32, f32) -> f32,
 }
 
 /// Each step costs the remaining distance.
-pub static HURRY: Rules = Rules { speed: 0.2, near: 0.15, limit: 30, reward: |_, after| -after };
+pub static HURRY: Rules = Rules { speed: 0.2, near: 0.15, limit: 30, shown: 30, reward: |_, after| -after };
 /// Coming nearer is rewarded.
-pub static WALK: Rules = Rules { speed: 0.1, near: 0.25, limit: 40, reward: |before, after| before - after };
+pub static WALK: Rules = Rules { speed: 0.1, near: 0.25, limit: 40, shown: 40, reward: |before, after| before - after };
+/// The same, with a goal that is seen once.
+pub static RECALL: Rules = Rules { shown: 1, ..WALK };
 
 /// A point at (x, y) in [-1, 1]² and its goal; the action is a velocity.
 #[derive(Clone, Copy)]
@@ -41,6 +45,12 @@ impl Point {
 
     pub fn observe(&self) -> [f32; OBS] {
         [self.place[0], self.place[1], self.goal[0], self.goal[1]]
+    }
+
+    /// Returns what these rules let a player see.
+    fn seen(&self, rules: &Rules) -> [f32; OBS] {
+        let [x, y, ..] = self.observe();
+        if self.time < rules.shown { self.observe() } else { [x, y, 0.0, 0.0] }
     }
 
     fn distance(&self) -> f32 {
@@ -64,6 +74,9 @@ impl Point {
 struct Held {
     z: Vec<f32>,
     left: usize,
+    /// What the policy over skills remembered before it was drawn, and after; empty without memory.
+    before: Vec<f32>,
+    now: Vec<f32>,
 }
 
 /// Several points at once, each with a skill of its own if there are any, and the results of their episodes.
@@ -85,7 +98,7 @@ impl Field {
     }
 
     fn observe(&self) -> Vec<f32> {
-        self.points.iter().flat_map(Point::observe).collect()
+        self.points.iter().flat_map(|point| point.seen(self.rules)).collect()
     }
 
     fn z(&self) -> Vec<f32> {
@@ -97,7 +110,11 @@ impl Field {
         for ((held, point), rng) in self.skills.iter_mut().zip(&self.points).zip(&mut self.rngs) {
             if held.left == 0 {
                 let noise = &mut |_| normal(rng);
-                held.z = source.prior.sample(&point.observe(), 1, source.draw, noise).expect("finite");
+                let seen = point.seen(self.rules);
+                held.before = std::mem::take(&mut held.now);
+                held.before.resize(source.prior.memory(), 0.0);
+                (held.z, held.now) =
+                    (source.prior).sample_remembering(&seen, &held.before, 1, source.draw, noise).expect("finite");
                 held.left = source.skill_interval;
             }
         }
@@ -117,6 +134,7 @@ impl Field {
             if let Some(source) = &source {
                 self.draw(source);
                 rollout.push_left(&self.shares_left(source));
+                rollout.push_memory(&self.skills.iter().flat_map(|held| held.before.clone()).collect::<Vec<_>>());
             }
             let (obs, z) = (self.observe(), self.z());
             let output = policy.forward(&z, &obs, envs).expect("finite");
@@ -133,16 +151,24 @@ impl Field {
                 if tick.truncated[row] && !tick.terminated[row] {
                     let obs = &last[row * OBS..(row + 1) * OBS];
                     rollout.push_cut(row, obs, &self.skills[row].z).expect("vectors");
+                    rollout.ends.cut_memory.extend_from_slice(&self.skills[row].now);
                 }
                 if tick.is_done(row) {
                     self.reached.push(tick.terminated[row]);
-                    (self.points[row], self.skills[row].left) = (Point::new(&mut self.rngs[row]), 0);
+                    self.points[row] = Point::new(&mut self.rngs[row]);
+                    (self.skills[row].left, self.skills[row].now) = (0, Vec::new());
                 }
             }
         }
         if let Some(source) = &source {
             rollout.ends.next_left = self.shares_left(source);
             rollout.ends.cut_left = vec![1.0; rollout.ends.cut_rows.len()];
+            for held in &self.skills {
+                let (memory, end) = (&mut rollout.ends.next_memory, source.prior.memory());
+                let all = memory.len() + end;
+                memory.extend_from_slice(&held.now);
+                memory.resize(all, 0.0);
+            }
         }
         (rollout.ends.next_obs, rollout.ends.next_z) = (self.observe().into(), self.z());
         rollout.bootstrap(&policy).expect("they fit");

@@ -341,8 +341,11 @@ fn what_remembers_is_not_widened() {
         learner.start_from(&StartFrom::new(&path)).expect_err("it does not fit").to_string()
     };
     assert!(refused(gru(8, 0), WIDTH + 1).contains("of fewer inputs"));
-    assert!(refused(MemoryKind::None, WIDTH).contains("another `ppo.memory`"));
-    assert!(refused(MemoryKind::Gru { hidden: 4, sequence: 8, burn_in: 0 }, WIDTH).contains("another `ppo.memory`"));
+    assert!(refused(MemoryKind::None, WIDTH).contains("and that of the new run is None: give it the same"));
+    assert!(
+        refused(MemoryKind::Gru { hidden: 4, sequence: 8, burn_in: 0 }, WIDTH)
+            .contains("its `ppo.memory` is Gru(hidden:")
+    );
 }
 
 #[test]

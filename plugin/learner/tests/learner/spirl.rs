@@ -1,11 +1,11 @@
 //! SPiRL: a policy over skills that start as the prior, learned by PPO and by SAC.
 
-use crate::field::{Field, SPACE, WALK};
+use crate::field::{Field, RECALL, SPACE, WALK};
 use crate::walkers::skills_of_directions;
 use playbot_learner::rng::{Streams, normal};
 use playbot_learner::{
-    DeviceKind, LearnError, Learner, PpoConfig, PriorKind, Rollout, SacConfig, ScoreConfig, SkillDraw, SkillModel,
-    SpirlConfig, SpirlLearner, TimeLimit,
+    DeviceKind, LearnError, Learner, MemoryKind, PolicyFile, PolicyMetadata, PpoConfig, Prior, PriorKind, Rollout,
+    SacConfig, ScoreConfig, SkillDraw, SkillModel, SpirlConfig, SpirlLearner, TimeLimit,
 };
 use std::sync::LazyLock;
 
@@ -95,6 +95,69 @@ fn it_learns_which_skills_lead_to_the_goal() {
     );
 }
 
+/// Returns a learner whose policy over skills remembers the states in which it drew some.
+fn remembering(memory: MemoryKind) -> SpirlLearner {
+    let (config, ppo) = (SpirlConfig { target_kl: Some(3.0), ..SpirlConfig::default() }, ppo_config());
+    let ppo = PpoConfig { memory, ..ppo };
+    SpirlLearner::ppo(config, ppo, &score(), &MODEL, 1, DeviceKind::Flex).expect("good settings")
+}
+
+const GRU: MemoryKind = MemoryKind::Gru { hidden: 16, sequence: 8, burn_in: 0 };
+
+#[test]
+fn a_policy_over_skills_with_memory_goes_on_towards_a_goal_that_it_saw_once() {
+    let success = |memory| {
+        let mut learner = remembering(memory);
+        let mut walkers = Field::new(&RECALL, 16, 1);
+        for _ in 0..60 {
+            learner.learn(&walkers.rollout(&learner, 64)).expect("finite");
+        }
+        Field::new(&RECALL, 64, 77).success(&learner, 120)
+    };
+    let (without, with) = (success(MemoryKind::None), success(GRU));
+    assert!(with > 0.7 && with > without + 0.2, "{without} without memory, {with} with");
+}
+
+#[test]
+fn a_memory_changes_nothing_at_first_and_goes_on_to_the_bit() {
+    let obs: Vec<f32> = (0..12u8).map(|i| f32::from(i) * 0.1 - 0.5).collect();
+    let learner = remembering(GRU);
+    assert_eq!(learner.initial_kl(&[], (&obs).into(), 3).expect("a copy"), Some(0.0));
+    let prior = learner.prior().expect("it has one");
+    let width = prior.memory();
+    let draw =
+        |memory: &[f32]| prior.sample_remembering(&obs, memory, 3, SkillDraw::Mean, &mut |_| 0.0).expect("finite");
+    let ((first, once), (_, twice)) = (draw(&[]), draw(&draw(&[]).1));
+    assert_eq!(first, MODEL.prior().sample(&obs, 3, SkillDraw::Mean, &mut |_| 0.0).expect("finite"));
+    assert!(width > 0 && once.len() == 3 * width && once != twice);
+    let short = prior.sample_remembering(&obs, &once[1..], 3, SkillDraw::Mean, &mut |_| 0.0);
+    assert!(short.expect_err("a number is missing").to_string().contains("memories of the prior"));
+    // A lone agent remembers as one among many.
+    let alone = prior.sample_remembering(&obs[..4], &once[..width], 1, SkillDraw::Mean, &mut |_| 0.0).expect("finite");
+    assert_eq!(alone.1, twice[..width]);
+
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("checkpoint.safetensors");
+    for memory in [GRU, MemoryKind::Stack { ticks: 3 }] {
+        let mut learner = remembering(memory);
+        train(&mut learner, 2, 32);
+        learner.save(&path).expect("written");
+        let mut loaded = SpirlLearner::load(&path, DeviceKind::Flex).expect("read");
+        assert_eq!(train(&mut learner, 2, 32), train(&mut loaded, 2, 32));
+        let file =
+            PolicyFile { metadata: PolicyMetadata::default(), policy: learner.policy(), skills: learner.skills() };
+        file.save(&path, &obs, &[0.1; 6], 3).expect("written");
+        let read = PolicyFile::load(&path, DeviceKind::Flex).expect("read").skills.expect("it has some").prior;
+        let twice = |prior: &Prior| {
+            let draw = |memory: &[f32]| {
+                prior.sample_remembering(&obs, memory, 3, SkillDraw::Mean, &mut |_| 0.0).expect("finite")
+            };
+            draw(&draw(&[]).1)
+        };
+        assert_eq!(twice(&read), twice(&learner.prior().expect("it has one")));
+    }
+}
+
 #[test]
 fn the_price_is_tuned_for_the_divergence_that_is_wanted() {
     for target in [0.1, 0.5] {
@@ -162,6 +225,10 @@ fn what_cannot_work_is_refused() {
     assert!(refused(ScoreConfig { prior: PriorKind::StandardNormal, ..score() }, ppo_config()).contains("prior"));
     let legacy = PpoConfig { time_limit: TimeLimit::Legacy, ..ppo_config() };
     assert!(refused(score(), legacy).contains("time_limit"));
+    let below = SpirlConfig { learn_decoder: true, ..SpirlConfig::default() };
+    let both = PpoConfig { memory: GRU, ..ppo_config() };
+    let error = SpirlLearner::ppo(below, both, &score(), &MODEL, 1, DeviceKind::Flex).expect_err("one memory at most");
+    assert!(error.to_string().contains("`ppo.memory` is that of the policy over skills"), "{error}");
 
     let mut learner = ppo(SpirlConfig::default());
     let short: Rollout = Field::new(&WALK, 2, 1).rollout(&learner, SKILL_INTERVAL - 1);
