@@ -391,7 +391,10 @@ impl Plugin for VirtualInputPlugin {
             .add_observer(move |event: On<EpisodeEnded>, mut releaser: InputReleaser| {
                 releaser.release(event.entity, route)
             })
-            .add_systems(PreUpdate, connect_gamepads.before(InputSystems).before(act::send_messages));
+            .add_systems(
+                PreUpdate,
+                connect_gamepads.before(InputSystems).before(PlaybotSystems::Begin).before(act::send_messages),
+            );
         messages::leave_pointer(app);
         match route {
             InputRoute::Messages => {
