@@ -4,6 +4,8 @@
 //! ```sh
 //! cargo run --release -p playbot_tests --example planted -- --seed 1 --count 30 --healthy 30 --out planted
 //! ```
+//!
+//! `--only "each tick pays"` leaves the faults of this name alone, on every game.
 #![allow(clippy::print_stdout, reason = "it prints what it does")]
 
 use std::{
@@ -27,7 +29,10 @@ use playbot_tests::{
 };
 use playbot_train::{
     Experiment,
-    diagnose::{Diagnosis, Gathering, diagnose, of_game, of_run},
+    diagnose::{
+        Diagnosis, Evidence, Gathering, diagnose, of_game, of_run,
+        play::{Played, PlayedEpisode},
+    },
     experiment::file::parse_experiment,
     pipeline,
     run_observer::Unobserved,
@@ -50,6 +55,8 @@ struct Ground {
     needed: Vec<u32>,
     /// A time limit that is too short.
     cut: u32,
+    /// Pay for each tick that makes waiting worth more than winning; `None` where lasting is the goal.
+    tick_pay: Option<u16>,
 }
 
 /// A game of the program, which lives as long as the program.
@@ -106,6 +113,7 @@ fn grounds() -> Vec<Ground> {
             steps: 8192,
             needed: vec![7, 8],
             cut: 8,
+            tick_pay: Some(1),
         },
         Ground {
             name: "maze2d",
@@ -121,6 +129,7 @@ fn grounds() -> Vec<Ground> {
             steps: 8192,
             needed: Vec::new(),
             cut: 4,
+            tick_pay: Some(1),
         },
         Ground {
             name: "maze2d-rays",
@@ -136,6 +145,7 @@ fn grounds() -> Vec<Ground> {
             steps: 8192,
             needed: Vec::new(),
             cut: 4,
+            tick_pay: Some(1),
         },
         Ground {
             name: "antmaze",
@@ -147,6 +157,7 @@ fn grounds() -> Vec<Ground> {
             steps: 3072,
             needed: Vec::new(),
             cut: 5,
+            tick_pay: Some(20),
         },
         Ground {
             name: "corridor",
@@ -158,6 +169,7 @@ fn grounds() -> Vec<Ground> {
             steps: 8192,
             needed: vec![1],
             cut: 2,
+            tick_pay: Some(1),
         },
         Ground {
             name: "catch",
@@ -169,6 +181,7 @@ fn grounds() -> Vec<Ground> {
             steps: 4096,
             needed: vec![2, 1],
             cut: 20,
+            tick_pay: None,
         },
     ]
 }
@@ -187,7 +200,8 @@ impl Ground {
         let needs_demos = fault.algorithms.contains(&"score-ppo") || fault.needs_demonstrator;
         let swaps = fault.rule == RuleFault::SwappedActions && self.is_discrete() && self.needed.len() < 2;
         let has_all = self.has_demonstrator() || !needs_demos;
-        has_all && (self.is_discrete() || !fault.is_discrete) && !swaps
+        let is_harmless = matches!(fault.rule, RuleFault::TickPay(_)) && self.tick_pay.is_none();
+        has_all && (self.is_discrete() || !fault.is_discrete) && !swaps && !is_harmless
     }
 
     fn experiment(&self, algorithm: &str, demos: &Path, seed: u64) -> Result<Experiment, Failure> {
@@ -253,11 +267,12 @@ struct Bench {
 }
 
 impl Bench {
-    /// Trains and diagnoses. Returns the diagnosis and the seconds that it took.
-    fn measure(&mut self, number: usize, case: &Case<'_>) -> Result<(Diagnosis, f64), Failure> {
+    /// Trains and diagnoses. Returns the evidence, the diagnosis and the seconds that it took.
+    fn measure(&mut self, number: usize, case: &Case<'_>) -> Result<(Evidence, Diagnosis, f64), Failure> {
         let Case { ground, fault, algorithm, seed } = *case;
         let rule = match fault.map_or(RuleFault::None, |fault| fault.rule) {
             RuleFault::CutOff(_) => RuleFault::CutOff(ground.cut),
+            RuleFault::TickPay(_) => RuleFault::TickPay(ground.tick_pay.unwrap_or_default()),
             rule => rule,
         };
         let planted = PlantedGame { game: ground.game.clone(), fault: rule, needed: ground.needed.clone() };
@@ -299,7 +314,8 @@ impl Bench {
                 }
             }
         };
-        Ok((diagnose(&evidence), start.elapsed().as_secs_f64()))
+        let diagnosis = diagnose(&evidence);
+        Ok((evidence, diagnosis, start.elapsed().as_secs_f64()))
     }
 }
 
@@ -308,11 +324,13 @@ struct Options {
     count: usize,
     healthy: usize,
     out: PathBuf,
+    /// The only fault to plant.
+    only: Option<String>,
 }
 
 impl Options {
     fn read() -> Result<Self, String> {
-        let mut options = Self { seed: 1, count: 30, healthy: 30, out: "planted".into() };
+        let mut options = Self { seed: 1, count: 30, healthy: 30, out: "planted".into(), only: None };
         let mut words = env::args().skip(1);
         while let Some(word) = words.next() {
             let value = words.next().ok_or(format!("{word} needs a value"))?;
@@ -322,7 +340,11 @@ impl Options {
                 "--count" => options.count = number()? as usize,
                 "--healthy" => options.healthy = number()? as usize,
                 "--out" => options.out = value.into(),
-                _ => return Err(format!("unknown option {word}: there are --seed, --count, --healthy and --out")),
+                "--only" => options.only = Some(value),
+                _ => {
+                    let known = "--seed, --count, --healthy, --out and --only";
+                    return Err(format!("unknown option {word}: there are {known}"));
+                }
             }
         }
         Ok(options)
@@ -350,16 +372,17 @@ fn run(options: &Options) -> Result<(), Failure> {
     fs::create_dir_all(&options.out)?;
     let grounds = grounds();
     let mut bench = Bench { out: options.out.clone(), skills: BTreeMap::new() };
+    let faults = || PLANTED_FAULTS.iter().filter(|fault| options.only.as_deref().is_none_or(|only| only == fault.name));
     let pairs = grounds
         .iter()
-        .flat_map(|ground| PLANTED_FAULTS.iter().filter(|fault| ground.takes(fault)).map(move |fault| (ground, fault)));
+        .flat_map(|ground| faults().filter(|fault| ground.takes(fault)).map(move |fault| (ground, fault)));
     let pairs = drawn(&pairs.collect::<Vec<_>>(), options.count, options.seed, "planted");
     let (mut hits, mut slowest, mut planted) = (0, 0.0_f64, 0);
     for (number, (ground, fault)) in pairs.into_iter().enumerate() {
         let can_score = ground.has_demonstrator() && (number % 2 == 0 || !fault.algorithms.is_empty());
         let algorithm = if can_score { "score-ppo" } else { "ppo" };
         let case = Case { ground, fault: Some(fault), algorithm, seed: options.seed + number as u64 };
-        let (diagnosis, seconds) = bench.measure(number, &case)?;
+        let (evidence, diagnosis, seconds) = bench.measure(number, &case)?;
         let signs: Vec<_> = diagnosis.findings.iter().map(|finding| finding.sign).collect();
         let is_hit = signs.iter().take(2).any(|sign| fault.signs.contains(sign));
         (hits, planted, slowest) = (hits + usize::from(is_hit), planted + 1, slowest.max(seconds));
@@ -368,6 +391,10 @@ fn run(options: &Options) -> Result<(), Failure> {
         println!("{mark} | {} | {} | {algorithm} | {} | {seconds:.1} s", ground.name, fault.name, names.join(", "));
         if !is_hit {
             println!("{diagnosis}");
+            for Played { seat, episodes, .. } in &evidence.played {
+                let of = |episode: &PlayedEpisode| (episode.ticks(), episode.total(), episode.end, episode.success);
+                println!("    {}: {:?}", seat.name(), episodes.iter().map(of).collect::<Vec<_>>());
+            }
         }
     }
     let sound = grounds.iter().flat_map(|ground| (0..6).map(move |round| (ground, round)));
@@ -376,7 +403,7 @@ fn run(options: &Options) -> Result<(), Failure> {
     for (number, (ground, round)) in sound.into_iter().enumerate() {
         let algorithm = if ground.has_demonstrator() && round % 2 == 0 { "score-ppo" } else { "ppo" };
         let case = Case { ground, fault: None, algorithm, seed: options.seed + 100 + round };
-        let (diagnosis, seconds) = bench.measure(1000 + number, &case)?;
+        let (_, diagnosis, seconds) = bench.measure(1000 + number, &case)?;
         (warned, healthy) = (warned + usize::from(!diagnosis.is_healthy()), healthy + 1);
         slowest = slowest.max(seconds);
         let names: Vec<&str> = diagnosis.findings.iter().map(|finding| finding.sign.name()).collect();

@@ -32,8 +32,8 @@ pub enum RuleFault {
     NoReward,
     /// Rewards have the wrong sign.
     NegativeReward,
-    /// Each tick pays.
-    TickPay,
+    /// Each tick pays so much.
+    TickPay(u16),
     /// A mask forbids what leads to the goal.
     Forbidden,
     /// Episodes are cut off after these ticks.
@@ -129,7 +129,7 @@ fn change_reward(planted: Res<Planted>, mut agents: Query<(&mut Reward, &Episode
             RuleFault::LargeReward => reward.add(paid * 999.0),
             RuleFault::NoReward => reward.add(-paid),
             RuleFault::NegativeReward => reward.add(-2.0 * paid),
-            RuleFault::TickPay => reward.add(1.0),
+            RuleFault::TickPay(pay) => reward.add(f32::from(pay)),
             _ => {}
         }
     }
@@ -298,7 +298,7 @@ pub const PLANTED_FAULTS: [PlantedFault; 24] = [
         signs: &[Sign::RewardAgainst],
         ..SOUND
     },
-    PlantedFault { name: "each tick pays", rule: RuleFault::TickPay, signs: &[Sign::IdlingPays], ..SOUND },
+    PlantedFault { name: "each tick pays", rule: RuleFault::TickPay(0), signs: &[Sign::IdlingPays], ..SOUND },
     PlantedFault {
         name: "mask that forbids the way",
         rule: RuleFault::Forbidden,

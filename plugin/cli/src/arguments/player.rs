@@ -137,7 +137,8 @@ impl LoadedPlayer {
         let OpenedRun { run, experiment, info } = opened;
         let checkpoint = open::checkpoint(run, info.algorithm, choice)?;
         let (done, wanted) = (checkpoint.summary.step, experiment.whole_steps());
-        if choice == CheckpointChoice::Last && done < wanted {
+        // Imitation has rounds of its own number of steps.
+        if choice == CheckpointChoice::Last && done < wanted && info.algorithm.is_trained() {
             let path = run.path().display();
             report!(
                 "{path} is not trained to its end: it has {} of {} steps",

@@ -203,7 +203,7 @@ fn show(path: &Path, device: DeviceKind, as_json: bool, games: &Games) -> Result
     if as_json {
         let mut all = json!({
             "card": metadata, "in_this_program": game.is_ok(), "action_space": policy.action_space(),
-            "latent": policy.latent(),
+            "latent": policy.latent(), "memory": policy.memory(),
             "horizon": skills.map(|skills| skills.skill_interval), "normalised": policy.normalises(),
         });
         let sets = EntitySet::all_in(&metadata.observations);
@@ -236,6 +236,9 @@ fn show(path: &Path, device: DeviceKind, as_json: bool, games: &Games) -> Result
             format!("observation   {}", output::with_names(&values, &metadata.observations))
         }
     })?;
+    if policy.memory() > 0 {
+        print_line(format!("memory        {}", counted(policy.memory() as u64, "number")))?;
+    }
     for set in EntitySet::all_in(&metadata.observations) {
         let alike = if policy.entities().contains(&set.block) { "" } else { ", read value by value" };
         print_line(format!("set           {set}{alike}"))?;

@@ -33,12 +33,26 @@ impl AdviceContext {
         shell_word(self.demos.as_deref().unwrap_or("demos"))
     }
 
-    /// Returns the command that trains again with changed settings.
+    /// Returns the command that trains again with changed settings, beside those of the run.
     fn train_with(&self, settings: &[String]) -> String {
         let skills = if self.algorithm.needs_skills() { " --skills skills.safetensors" } else { "" };
         let sets: String = settings.iter().map(|set| format!(" --set {}", shell_word(set))).collect();
-        let (game, algorithm) = (shell_word(&self.game), self.algorithm);
-        format!("playbot train {game} --algorithm {algorithm}{skills} --run runs/next{sets}")
+        let verb = if self.algorithm == Algorithm::Imitation { "imitate" } else { "train" };
+        match &self.run {
+            Some(run) => {
+                let run = run.trim_end_matches('/');
+                let (from, to) = (shell_word(&format!("{run}/experiment.ron")), shell_word(&format!("{run}-next")));
+                format!("playbot {verb} --experiment {from}{skills} --run {to}{sets}")
+            }
+            None => {
+                let game = shell_word(&self.game);
+                let algorithm = match verb {
+                    "train" => format!(" --algorithm {}", self.algorithm),
+                    _ => String::new(),
+                };
+                format!("playbot {verb} {game}{algorithm}{skills} --run runs/next{sets}")
+            }
+        }
     }
 
     /// Returns the command that learns skills again with changed settings.
@@ -164,6 +178,8 @@ impl Advice {
         let own = |set: &str| vec![format!("{section}.{set}")];
         let one = |set: &str| vec![set.to_owned()];
         match self {
+            Self::LowerRate if algorithm == Algorithm::Imitation => one("imitation.lr=0.001"),
+            Self::RaiseRate if algorithm == Algorithm::Imitation => one("imitation.lr=0.003"),
             Self::LowerRate if is_ppo => own("lr=0.0003"),
             Self::LowerRate => vec!["sac.actor_lr=0.0003".to_owned(), "sac.critic_lr=0.0003".to_owned()],
             Self::RaiseRate if is_ppo => own("lr=0.0005"),
@@ -295,6 +311,12 @@ mod tests {
             words,
             "lower the learning rate with `playbot train 'a b' --algorithm ppo --run runs/next --set ppo.lr=0.0003`"
         );
+        let of_run = AdviceContext { run: Some("runs/a".to_owned()), ..context.clone() };
+        let words = "playbot train --experiment runs/a/experiment.ron --run runs/a-next --set ppo.lr=0.0003";
+        assert_eq!(Advice::LowerRate.command(&of_run).as_deref(), Some(words));
+        let imitated = AdviceContext { algorithm: Algorithm::Imitation, ..of_run };
+        let words = "playbot imitate --experiment runs/a/experiment.ron --run runs/a-next --set imitation.lr=0.001";
+        assert_eq!(Advice::LowerRate.command(&imitated).as_deref(), Some(words));
         assert!(Advice::PayReward.command(&context).is_none());
         assert!(Advice::PayReward.words(&context).starts_with("call `reward.add(1.0)`"));
     }

@@ -41,12 +41,11 @@ fn version(evidence: &Evidence, set: &RecordedSet) -> Option<LearningFinding> {
         ),
         (true, None) => return None,
     };
-    Some(LearningFinding::new(
-        Sign::OtherVersion,
-        words,
-        "the game has changed since it was recorded: the same actions lead elsewhere",
-        &[Advice::RecordAgain, Advice::ShowRecordings],
-    ))
+    let cause = match others.is_empty() {
+        false => "they are recordings of another game, which show nothing of this one",
+        true => "the game has changed since it was recorded: the same actions lead elsewhere",
+    };
+    Some(LearningFinding::new(Sign::OtherVersion, words, cause, &[Advice::RecordAgain, Advice::ShowRecordings]))
 }
 
 fn no_replay(evidence: &Evidence, set: &RecordedSet) -> Option<LearningFinding> {

@@ -19,6 +19,8 @@ pub enum Sign {
     NoReplay,
     /// The game differs from itself.
     Differs,
+    /// Time is up before the goal can be reached. In a few ticks observed values hardly change.
+    ShortTime,
     /// Observed values never change.
     ConstantObservation,
     /// Masks forbid what demonstrators do.
@@ -33,8 +35,6 @@ pub enum Sign {
     Contradictory,
     /// Recordings without a win.
     NeverWon,
-    /// Time is up before the goal can be reached.
-    ShortTime,
     /// No player is ever rewarded.
     NoReward,
     /// Doing nothing earns as much as the demonstrator.
@@ -131,7 +131,7 @@ impl Sign {
         match self {
             Self::GameFault => "the game breaks off",
             Self::NotFinite => "an observed value is not finite",
-            Self::OtherVersion => "the recordings are of other rules",
+            Self::OtherVersion => "the recordings are of other rules or of another game",
             Self::NoReplay => "the recordings do not replay",
             Self::Differs => "the game differs from itself",
             Self::ConstantObservation => "observed values never change",
@@ -224,7 +224,7 @@ impl Diagnosis {
         self.findings.is_empty()
     }
 
-    /// Returns `{"findings": [{"sign", "evidence", "cause", "try"}]}`.
+    /// Returns `{"findings": [{"sign", "evidence", "cause", "try"}], "notes": []}`.
     pub fn to_json(&self) -> Value {
         let findings = self.findings.iter().map(|finding| {
             json!({
@@ -234,7 +234,7 @@ impl Diagnosis {
                 "try": finding.next_steps(&self.context),
             })
         });
-        json!({ "findings": findings.collect::<Vec<_>>() })
+        json!({ "findings": findings.collect::<Vec<_>>(), "notes": self.notes })
     }
 
     /// Returns the part of a page that shows the findings.
@@ -246,7 +246,7 @@ impl Diagnosis {
         });
         let table = PlainTable { columns, rows: rows.collect(), ..PlainTable::default() };
         let text = match self.findings.len() {
-            0 => "Nothing was found that would keep it from learning.".to_owned(),
+            0 => "None of the known signs of what keeps an agent from learning was found.".to_owned(),
             count => format!("{}, the most likely cause first.", counted(count as u64, "finding")),
         };
         let tables = if self.is_healthy() { Vec::new() } else { vec![Table::Plain(table)] };
@@ -257,7 +257,7 @@ impl Diagnosis {
 impl fmt::Display for Diagnosis {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.is_healthy() {
-            write!(f, "nothing found that would keep it from learning")?;
+            write!(f, "none of the known signs of what keeps an agent from learning")?;
         }
         for (number, finding) in self.findings.iter().enumerate() {
             let end = if number == 0 { "" } else { "\n\n" };
@@ -292,9 +292,9 @@ mod tests {
         let expected = json!({ "findings": [{
             "sign": "game-differs-from-itself", "evidence": "evidence of game-differs-from-itself", "cause": "a cause",
             "try": "look for the first difference with `playbot doctor maze2d --mode MODE`",
-        }] });
+        }], "notes": [] });
         assert_eq!(diagnosis.to_json(), expected);
-        assert_eq!(Diagnosis::default().to_json(), json!({ "findings": [] }));
+        assert_eq!(Diagnosis::default().to_json(), json!({ "findings": [], "notes": [] }));
     }
 
     #[test]

@@ -44,25 +44,38 @@ impl ForcedAction {
     }
 }
 
-/// Tries every action but the idle ones, from a few moments of an episode on. A continuous value is tried far up and far
-/// down.
+/// Tries every action but the idle ones, from a few moments of an episode on, unless it has an effect in `forced` already,
+/// and adds the results there. A continuous value is tried far up and far down.
 ///
 /// # Errors
 ///
 /// The game broke its contract.
-pub fn force(game: &dyn Game, mode: &str, episode: &PlayedEpisode) -> Result<Vec<ForcedAction>, Fault> {
-    let idle = idle_action(game);
+pub fn force(
+    game: &dyn Game,
+    mode: &str,
+    episode: &PlayedEpisode,
+    forced: &mut Vec<ForcedAction>,
+) -> Result<(), Fault> {
+    let (idle, candidates) = (idle_action(game), candidates(game));
+    if forced.is_empty() {
+        let untried = |(name, number, _): &(String, u32, _)| ForcedAction {
+            name: name.clone(),
+            number: *number,
+            tried: 0,
+            effects: 0,
+        };
+        forced.extend(candidates.iter().map(untried));
+    }
+    if forced.iter().all(|action| action.effects > 0) {
+        return Ok(());
+    }
     let length = episode.actions.len().min(LATEST);
     let mut moments: Vec<usize> = (0..MOMENTS).map(|moment| length * moment / MOMENTS).collect();
     moments.dedup();
-    let mut forced: Vec<_> = candidates(game)
-        .into_iter()
-        .map(|(name, number, ways)| (ForcedAction { name, number, tried: 0, effects: 0 }, ways))
-        .collect();
     for moment in moments {
         let before = &episode.actions[..moment];
         let nothing = held(game, mode, episode.level, before, &idle)?;
-        for (action, ways) in &mut forced {
+        for (action, (.., ways)) in forced.iter_mut().zip(&candidates).filter(|(action, _)| action.effects == 0) {
             // A masked action would not be played.
             let mask = episode.masks.get(moment);
             let is_legal = mask.is_none_or(|mask| mask.get(action.number as usize).copied().unwrap_or(true));
@@ -78,7 +91,7 @@ pub fn force(game: &dyn Game, mode: &str, episode: &PlayedEpisode) -> Result<Vec
             }
         }
     }
-    Ok(forced.into_iter().map(|(action, _)| action).collect())
+    Ok(())
 }
 
 /// Returns the actions to try: name, number, and the ways to take each.

@@ -6,11 +6,12 @@ use crate::{
         evidence::Evidence,
         forced::force,
         networks::{probe, probe_decoder},
-        play::{PlayPlan, Played, PlayedEpisode, Seat, play},
+        play::{PlayPlan, PlayedEpisode, Seat, play},
         recordings::RecordedSet,
     },
     error::RunError,
     experiment::Experiment,
+    metrics_log::EPISODES as EPISODES_TAG,
     run_dir::{OpenedRun, RunDir},
     runs::{RunCurves, RunsError},
     trainer::TrainedLearner,
@@ -27,6 +28,7 @@ use playbot_harness::{
     split::LevelSplit,
 };
 use playbot_learner::{DeviceKind, FileError, HasExitCode, LearnError, Policy, SkillModel};
+use playbot_report::counted;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -34,8 +36,15 @@ use thiserror::Error;
 const EPISODES: u64 = 8;
 const POLICY_EPISODES: u64 = 16;
 
-/// Most ticks of each player, all agents together.
+/// Most ticks of each player, all agents together, and of the demonstrator: whether it is paid decides about the game.
 const TICKS: usize = 6000;
+const DEMONSTRATOR_TICKS: usize = 24_000;
+
+/// Courses of episodes from which actions are forced that have changed nothing so far.
+const COURSES: usize = 6;
+
+/// Updates under which a run shows little.
+const FEWEST_UPDATES: usize = 10;
 
 /// Ticks of each of the doctor's comparisons.
 const DOCTOR_TICKS: u32 = 60;
@@ -126,13 +135,14 @@ pub fn of_run(
             game.version()
         ));
     }
+    note_youth(&mut evidence);
     if !gathering.replays {
         evidence.notes.push("nothing was played: --replays looks at rewards, observations and actions, too".to_owned());
         decode(&mut evidence, skills)?;
         return Ok(evidence);
     }
     let policy = match run.checkpoint(CheckpointChoice::Last) {
-        Ok(checkpoint) if experiment.algorithm.is_trained() => {
+        Ok(checkpoint) if experiment.algorithm.has_checkpoints() => {
             let learner = TrainedLearner::load(info.algorithm, &checkpoint.learner_file(), gathering.device)?;
             Some((learner.policy(), learner.skills().as_ref().map(SkillPrior::from)))
         }
@@ -193,6 +203,20 @@ pub fn of_game(
     play_all(&mut evidence, game, None, gathering)?;
     decode(&mut evidence, skills)?;
     Ok(evidence)
+}
+
+/// Notes how little a run shows that has hardly begun.
+fn note_youth(evidence: &mut Evidence) {
+    let Some(curves) = evidence.curves.as_ref() else { return };
+    let updates = curves.curve(EPISODES_TAG).len();
+    let episodes = curves.last(EPISODES_TAG).unwrap_or_default();
+    if updates < FEWEST_UPDATES || episodes < 1.0 {
+        evidence.notes.push(format!(
+            "the run shows little yet, so most signs cannot be seen: it has {} and {}",
+            counted(updates as u64, "update"),
+            counted(episodes as u64, "ended episode")
+        ));
+    }
 }
 
 fn begin(game: &dyn Game, experiment: &Experiment) -> Evidence {
@@ -285,7 +309,8 @@ fn jobs(
         (Seat::Idle, Player::Blind(BlindBot::Constant(idle_action(game))), plan(&experiment.train, EPISODES)),
     ];
     if game.tools().bots.demonstrator().is_some() {
-        jobs.push((Seat::Demonstrator, Player::Demonstrator, plan(&experiment.train, EPISODES)));
+        let plan = PlayPlan { ticks: DEMONSTRATOR_TICKS, ..plan(&experiment.train, EPISODES) };
+        jobs.push((Seat::Demonstrator, Player::Demonstrator, plan));
     }
     if let Some((policy, prior)) = policy {
         let player = Player::Policy { policy: policy.clone(), prior: prior.clone(), draw: ActionDraw::Sample };
@@ -295,15 +320,22 @@ fn jobs(
     jobs
 }
 
-/// Forces actions from moments of the demonstrator's longest episode, or else of chaos.
+/// Forces actions from moments of the longest episodes of the demonstrator and of chaos. Those that change nothing are
+/// forced in further episodes: some work in a few places only, such as beside a ladder.
 fn force_actions(evidence: &mut Evidence, game: &dyn Game) {
-    let longest = |played: &Played| played.episodes.iter().max_by_key(|episode| episode.ticks()).cloned();
-    let course = [Seat::Demonstrator, Seat::Chaos].into_iter().find_map(|seat| longest(evidence.played(seat)?));
-    let Some(course) = course else { return };
-    match force(game, &evidence.experiment.train.mode, &course) {
-        Ok(forced) => evidence.forced = forced,
-        Err(fault) => evidence.faults.push(fault.to_string()),
+    let longest_first = |seat: Seat| {
+        let mut episodes: Vec<_> = evidence.played(seat).into_iter().flat_map(|played| &played.episodes).collect();
+        episodes.sort_by_key(|episode| std::cmp::Reverse(episode.ticks()));
+        episodes.into_iter().take(COURSES / 2)
+    };
+    let courses: Vec<_> = [Seat::Demonstrator, Seat::Chaos].into_iter().flat_map(longest_first).cloned().collect();
+    let mut forced = Vec::new();
+    for course in &courses {
+        if let Err(fault) = force(game, &evidence.experiment.train.mode, course, &mut forced) {
+            return evidence.faults.push(fault.to_string());
+        }
     }
+    evidence.forced = forced;
 }
 
 fn examine_game(evidence: &mut Evidence, game: &dyn Game) {

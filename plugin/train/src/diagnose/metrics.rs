@@ -22,6 +22,9 @@ const LOWEST_RATE: f64 = 1e-7;
 /// Passes over a rollout from which on they are too many whatever the metrics say: ten times the usual number.
 const MOST_PASSES: usize = 30;
 
+/// A clip range beyond which nothing is clipped in practice.
+const LARGEST_CLIP: f64 = 1.0;
+
 /// Bounds of a mean KL divergence and clip share in an update. Schulman et al. (2017) aim at 0.003 to 0.03.
 const LARGEST_KL: f64 = 0.5;
 const LARGEST_CLIP_SHARE: f64 = 0.6;
@@ -75,6 +78,9 @@ fn settings(experiment: &Experiment, tag: &Tag<'_>) -> Vec<LearningFinding> {
     let Experiment { ppo, sac, score, algorithm, .. } = experiment;
     let mut found = Vec::new();
     let (rates, is_ppo) = match algorithm.learner() {
+        LearnerKind::Ppo if *algorithm == Algorithm::Imitation => {
+            (vec![("imitation.lr", experiment.imitation.lr)], false)
+        }
         LearnerKind::Ppo => (vec![("ppo.lr", ppo.lr)], true),
         LearnerKind::Sac => (vec![("sac.actor_lr", sac.actor_lr), ("sac.critic_lr", sac.critic_lr)], false),
     };
@@ -91,10 +97,15 @@ fn settings(experiment: &Experiment, tag: &Tag<'_>) -> Vec<LearningFinding> {
         ));
     }
     if is_ppo && ppo.epochs >= MOST_PASSES {
-        let clipped = tag("clip_fraction").last().map_or("an unknown share".to_owned(), |(_, share)| readable(*share));
+        let clip =
+            if ppo.clip > LARGEST_CLIP { format!(", `ppo.clip` is {}", readable(ppo.clip)) } else { String::new() };
         found.push(LearningFinding::new(
             Sign::MovesTooFar,
-            format!("`ppo.epochs` is {}, and {clipped} of the actions are clipped in the last update", ppo.epochs),
+            format!(
+                "`ppo.epochs` is {}{clip}, and the KL divergence of the last update is {}",
+                ppo.epochs,
+                last(tag, "approx_kl")
+            ),
             "each rollout is learned from until the policy fits what was chance in it",
             &[Advice::FewerPasses],
         ));

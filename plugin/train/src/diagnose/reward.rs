@@ -4,7 +4,7 @@ use crate::diagnose::{
     advice::Advice,
     evidence::{Evidence, discount_and_norm},
     finding::{LearningFinding, Sign},
-    play::{Played, PlayedEpisode, Seat, median},
+    play::{Played, PlayedEpisode, Seat, mean, median},
     recordings::replayed_episodes,
 };
 use bevy_playbot::episode::EpisodeEnd;
@@ -15,6 +15,12 @@ const LARGEST_REWARD: f32 = 100.0;
 
 /// Share of the demonstrator's return that doing nothing must not reach.
 const MOST_FOR_NOTHING: f64 = 0.8;
+
+/// Fewest won episodes, and fewest that were cut off, whose returns are compared.
+const FEWEST_OF_A_KIND: usize = 4;
+
+/// A demonstrator lasts longer than random actions if its episodes have so many times their ticks.
+const LONGER: f64 = 1.5;
 
 /// Share of episodes under which a reward is rare.
 const RARE: f64 = 0.01;
@@ -35,7 +41,7 @@ pub fn check(evidence: &Evidence) -> Vec<LearningFinding> {
     found.extend(too_short(evidence));
     found.extend(never(evidence));
     found.extend(rare(evidence));
-    found.extend(idling(evidence));
+    found.extend(idling(evidence).or_else(|| waiting(evidence)));
     found.extend(against(evidence));
     found.extend(scale(evidence));
     found.extend(horizon(evidence));
@@ -96,6 +102,10 @@ fn never(evidence: &Evidence) -> Option<LearningFinding> {
         return None;
     }
     let demonstrator = evidence.played(Seat::Demonstrator);
+    if demonstrator.is_some_and(|played| played.ended().next().is_none()) {
+        // It may be on its way to a reward.
+        return None;
+    }
     let wins = demonstrator.map_or(0, |played| played.ended().filter(|episode| episode.success).count());
     let (words, cause, advice) = match demonstrator {
         Some(_) if wins > 0 => (
@@ -161,14 +171,55 @@ fn idling(evidence: &Evidence) -> Option<LearningFinding> {
     })
 }
 
+/// Returns the mean ticks of a player's episodes.
+fn ticks_of(played: &Played) -> f64 {
+    mean(played.ended().map(|episode| episode.ticks() as f64)).unwrap_or_default()
+}
+
+/// Finds that episodes which are cut off earn more than those that are won, whoever plays them.
+fn waiting(evidence: &Evidence) -> Option<LearningFinding> {
+    let ended = || evidence.played.iter().flat_map(Played::ended);
+    let won = ended().filter(|episode| episode.success);
+    let cut = ended().filter(|episode| !episode.success && episode.end == Some(EpisodeEnd::Truncated));
+    let (won, cut): (Vec<_>, Vec<_>) = (won.collect(), cut.collect());
+    if won.len() < FEWEST_OF_A_KIND || cut.len() < FEWEST_OF_A_KIND {
+        return None;
+    }
+    let earned = |of: &[&PlayedEpisode]| mean(of.iter().map(|episode| episode.total()));
+    let ticks = |of: &[&PlayedEpisode]| mean(of.iter().map(|episode| episode.ticks() as f64));
+    let (for_winning, for_waiting) = (earned(&won)?, earned(&cut)?);
+    if for_waiting <= 0.0 || for_winning >= MOST_FOR_NOTHING * for_waiting {
+        return None;
+    }
+    let words = |of: &[&PlayedEpisode], earned: f64| {
+        Some(format!("{} earn {} in {} ticks", of.len(), readable(earned), readable(ticks(of)?)))
+    };
+    Some(LearningFinding::new(
+        Sign::IdlingPays,
+        format!(
+            "of all episodes on the mean, the won {}, and the {} that were cut off",
+            words(&won, for_winning)?,
+            words(&cut, for_waiting)?
+        ),
+        "the game pays for each tick, so an agent that stays away from the goal earns more than one that wins",
+        &[Advice::PayGoal, Advice::MeasureBots],
+    ))
+}
+
 fn against(evidence: &Evidence) -> Option<LearningFinding> {
     let demonstrator = evidence.played(Seat::Demonstrator)?;
     let (worth, random) = (demonstrator.mean_return()?, evidence.played(Seat::Random)?.mean_return()?);
     let wins = demonstrator.success().unwrap_or_default();
-    (wins > 0.0 && worth < random - 0.1 * random.abs().max(1e-6)).then(|| {
+    // Where nobody can win, as in a game that goes on until it is lost, the reward alone says what is wanted.
+    let lasts = || ticks_of(demonstrator) > LONGER * evidence.played(Seat::Random).map_or(0.0, ticks_of);
+    (worth < random - 0.1 * random.abs().max(1e-6) && (wins > 0.0 || lasts())).then(|| {
+        let words = match wins > 0.0 {
+            true => format!("the demonstrator wins {} of its episodes", percent(wins)),
+            false => format!("the demonstrator lasts {} ticks on the mean", whole(ticks_of(demonstrator))),
+        };
         LearningFinding::new(
             Sign::RewardAgainst,
-            format!("the demonstrator wins {} of its episodes; returns: {}", percent(wins), returns(evidence)),
+            format!("{words}; returns: {}", returns(evidence)),
             "the reward has the wrong sign, or its penalties outweigh the goal",
             &[Advice::PayGoal],
         )
@@ -250,6 +301,33 @@ mod tests {
         let players =
             [player(Seat::Random, 0.0, CUT), player(Seat::Idle, 0.0, CUT), player(Seat::Demonstrator, 1.0, WON)];
         assert_eq!(signs(&players, ""), []);
+    }
+
+    #[test]
+    fn a_game_that_pays_more_for_waiting_than_for_a_win_is_found() {
+        // Random actions win after a few ticks or are cut off after many; idle ones die at once.
+        let pays_ticks = |won: usize| {
+            let mut random = player(Seat::Random, 0.0, CUT);
+            let episode = PlayedEpisode { rewards: vec![1.0; 40], ..random.episodes[0].clone() };
+            let win = PlayedEpisode { rewards: vec![1.0; 10], end: WON, success: true, ..episode.clone() };
+            random.episodes = [vec![episode; 4], vec![win; won]].concat();
+            let mut idle = player(Seat::Idle, 0.0, CUT);
+            idle.episodes[0].rewards = vec![1.0; 4];
+            [random, idle]
+        };
+        assert_eq!(signs(&pays_ticks(4), ""), [Sign::IdlingPays]);
+        assert_eq!(signs(&pays_ticks(3), ""), [], "too few to compare");
+    }
+
+    #[test]
+    fn a_reward_that_punishes_those_who_last_is_found_where_nobody_can_win() {
+        let lost = Some(EpisodeEnd::Terminated { success: false });
+        let lasting = player(Seat::Demonstrator, -5.0, CUT);
+        let mut random = player(Seat::Random, 0.0, lost);
+        random.episodes[0].rewards = vec![0.0, -1.0];
+        assert_eq!(signs(&[random, lasting.clone()], ""), [Sign::RewardAgainst]);
+        // One that dies as early as random actions is a bad demonstrator.
+        assert_eq!(signs(&[player(Seat::Random, -1.0, lost), lasting], ""), []);
     }
 
     #[test]

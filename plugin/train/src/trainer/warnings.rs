@@ -8,6 +8,9 @@ use std::ops::RangeInclusive;
 /// Sizes of the largest numbers of a kind from which networks learn as they are: their weights begin for sizes about 1.
 const FIT: RangeInclusive<f32> = 1e-3..=100.0;
 
+/// A value that is not 0 in fewer than one of so many rows is rare.
+const RARE: usize = 10;
+
 /// Most observed values that a warning names.
 const NAMED: usize = 3;
 
@@ -31,9 +34,12 @@ pub(super) fn strange_scales(experiment: &Experiment, raw: &[String], rollout: &
     let up_to = |size: f32| format!("up to {}", readable(f64::from(size)));
     let mut warnings = Vec::new();
     if let Observations::Vector(values) = &rollout.obs {
-        let size = |index: usize| largest(&mut values.iter().skip(index).step_by(raw.len().max(1)).copied());
-        let sizes = raw.iter().enumerate().map(|(index, name)| (name, size(index)));
-        let strange: Vec<_> = sizes.filter(|(_, size)| is_strange(*size)).collect();
+        let of = |index: usize| values.iter().skip(index).step_by(raw.len().max(1)).copied();
+        let sizes = raw.iter().enumerate().map(|(index, name)| (index, name, largest(&mut of(index))));
+        // A value that is 0 nearly always has shown little of its range.
+        let is_rare = |index: usize| of(index).filter(|value| *value != 0.0).count() * RARE < of(index).count();
+        let strange = sizes.filter(|(index, _, size)| is_strange(*size) && (*size > 1.0 || !is_rare(*index)));
+        let strange: Vec<_> = strange.map(|(_, name, size)| (name, size)).collect();
         let mut words: Vec<_> =
             strange.iter().take(NAMED).map(|(name, size)| format!("`{name}` ({})", up_to(*size))).collect();
         let more = strange.len().saturating_sub(NAMED);
