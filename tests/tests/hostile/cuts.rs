@@ -6,10 +6,11 @@ use playbot_tests::hostile::{FileKind, Form, Reading};
 
 use crate::{KINDS, whole};
 
-/// Lengths at which a file is cut off that is read into a World, beside the ends of its lines.
+/// Lengths at which a file is cut off, beside the ends of its lines: of a file that is read into a World, and of others.
 const SLOW_CUTS: usize = 100;
+const CUTS: usize = 1000;
 
-/// Cuts the files of some kinds at every byte.
+/// Cuts the files of some kinds at many bytes, and short ones at every byte.
 fn cut_all(wanted: impl Fn(&&FileKind) -> bool) {
     let folder = tempfile::tempdir().expect("a folder");
     let place = folder.path().join("kind");
@@ -36,10 +37,7 @@ fn cut_all(wanted: impl Fn(&&FileKind) -> bool) {
 /// Returns the lengths at which a file is cut off.
 fn lengths(kind: &FileKind) -> Vec<usize> {
     let bytes = kind.bytes();
-    if !kind.is_slow {
-        return (0..bytes.len()).collect();
-    }
-    let step = bytes.len().div_ceil(SLOW_CUTS);
+    let step = bytes.len().div_ceil(if kind.is_slow { SLOW_CUTS } else { CUTS });
     let is_wanted = |&length: &usize| {
         let ends_line = |at: usize| bytes.get(at) == Some(&b'\n');
         length.is_multiple_of(step) || ends_line(length) || (length > 0 && ends_line(length - 1))
