@@ -171,7 +171,7 @@ fn a_mask_that_forbids_everything_is_a_fault_with_agent_and_tick() {
     let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
     world.entity_mut(agents[0]).insert((Control::Bot, BlindBot::Uniform, LevelQueue::Always(0)));
     let text = world.tick().expect_err("none is legal").to_string();
-    for part in ["agent 0", "tick 0", "forbid every action"] {
+    for part in ["agent 0", "level ", "tick 0", "forbid every action"] {
         assert!(text.contains(part), "`{part}` is missing in: {text}");
     }
 }

@@ -39,7 +39,7 @@ use std::{
   playbot diagnose --run runs/first --replays --out why.html
   playbot diagnose --demo my.demo --replays
   playbot diagnose GAME
-  playbot diagnose GAME --set algorithm=ppo --set ppo.gamma=0.9")]
+  playbot diagnose GAME --set algorithm=ppo --set ppo.gamma=0.5")]
 pub struct Args {
     #[command(flatten)]
     from: ExperimentArgs,

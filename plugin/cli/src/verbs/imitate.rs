@@ -138,6 +138,9 @@ fn begin<'a>(
             "nothing to imitate: name recordings with --demos, or ask the game's demonstrator with --dagger".to_owned(),
         ));
     }
+    if args.steps.is_some() && !experiment.imitation.dagger {
+        report!("warning: --steps changes nothing without --dagger: recordings are learned from as a whole");
+    }
     check_start(game, &experiment.train.mode, experiment.train.first)?;
     interrupt::leave("nothing is learned yet".to_owned());
     let new = NewRun {

@@ -29,7 +29,12 @@ impl PpoLearner {
             return differs("skills of another width, or another `score.condition`,");
         }
         if self.base.observations.is_some() != other.base.observations.is_some() {
-            return differs("another `ppo.norm_obs`");
+            let theirs = other.base.observations.is_some();
+            return Err(LearnError::Config(format!(
+                "its `ppo.norm_obs` is {theirs}, and that of the new run is {}: give it the same, with --set \
+                 ppo.norm_obs={theirs}",
+                !theirs
+            )));
         }
         let (shape, their_shape) = (actor_shape(&self.config, &self.base), actor_shape(&other.config, &other.base));
         let memory = match (shape.memory, their_shape.memory) {

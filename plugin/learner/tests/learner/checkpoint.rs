@@ -61,7 +61,7 @@ fn a_learner_starts_from_the_weights_of_another_run_with_its_own_settings() {
     assert_eq!(values(&second), values(&first));
     assert_eq!((second.updates(), second.config().lr), (0, 0.004));
     let raw = new(config(), 6).start_from(&StartFrom::new(&path)).expect_err("without a normaliser").to_string();
-    assert!(raw.contains("it has another `ppo.norm_obs` than the new run"), "{raw}");
+    assert!(raw.contains("and that of the new run is"), "{raw}");
     let wide = PpoConfig { hidden: vec![3], norm_obs: true, ..config() };
     let wide = new(wide, 6).start_from(&StartFrom::new(&path)).expect_err("other layers").to_string();
     assert!(wide.contains("no layer of its policy fits: its hidden layers are"), "{wide}");

@@ -14,6 +14,9 @@ use playbot_report::{percent, whole};
 /// Share of the recorded ticks from which on an action is needed.
 const NEEDED: f64 = 0.01;
 
+/// How many times as often as by noise a needed action is taken.
+const ABOVE_NOISE: f64 = 1.5;
+
 /// Share of ticks that counts as nearly always.
 const NEARLY_ALWAYS: f64 = 0.99;
 
@@ -81,7 +84,14 @@ fn forbidden(evidence: &Evidence) -> Option<LearningFinding> {
     ))
 }
 
+/// Returns the share from which on a discrete action is needed: more than noise puts into recordings.
+fn needed_share(evidence: &Evidence) -> f64 {
+    let noise = evidence.experiment.skills.action_noise / evidence.action_names.len().max(1) as f64;
+    NEEDED.max(ABOVE_NOISE * noise)
+}
+
 fn dead(evidence: &Evidence) -> Option<LearningFinding> {
+    let least = needed_share(evidence);
     let dead: Vec<&ForcedAction> = evidence.forced.iter().filter(|action| action.is_dead()).collect();
     let tried = evidence.forced.iter().filter(|action| action.tried > 0).count();
     let is_continuous = matches!(
@@ -90,7 +100,7 @@ fn dead(evidence: &Evidence) -> Option<LearningFinding> {
     );
     let needed: Vec<&&ForcedAction> = dead
         .iter()
-        .filter(|action| is_continuous || demonstrated(evidence, action.number).is_some_and(|share| share >= NEEDED))
+        .filter(|action| is_continuous || demonstrated(evidence, action.number).is_some_and(|share| share >= least))
         .collect();
     let all = !dead.is_empty() && dead.len() == tried;
     if needed.is_empty() && !all {

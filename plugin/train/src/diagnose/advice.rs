@@ -83,6 +83,10 @@ pub enum Advice {
     FindDeadActions,
     /// Begin from recordings.
     UseRecordings,
+    /// Reward what is new.
+    BeCurious,
+    /// Ask the demonstrator.
+    AskDemonstrator,
     /// Train longer.
     TrainLonger,
     /// Lower the learning rate.
@@ -135,7 +139,7 @@ pub enum Advice {
 
 impl Advice {
     /// All of them.
-    pub const ALL: [Self; 33] = [
+    pub const ALL: [Self; 35] = [
         Self::Doctor,
         Self::Verify,
         Self::ShowRecordings,
@@ -145,6 +149,8 @@ impl Advice {
         Self::MeasureBots,
         Self::FindDeadActions,
         Self::UseRecordings,
+        Self::BeCurious,
+        Self::AskDemonstrator,
         Self::TrainLonger,
         Self::LowerRate,
         Self::RaiseRate,
@@ -187,6 +193,7 @@ impl Advice {
             Self::AllowGradients => one("ppo.max_grad_norm=0.5"),
             Self::LowerEntropy if is_ppo => one("ppo.ent_coef=0.003"),
             Self::RaiseEntropy if is_ppo => one("ppo.ent_coef=0.03"),
+            Self::BeCurious if matches!(algorithm, Algorithm::Ppo | Algorithm::ScorePpo) => one("ppo.curiosity=Rnd()"),
             Self::LookAhead => own("gamma=0.99"),
             Self::RaiseLambda => one("ppo.lambda=0.95"),
             Self::LowerPenalty => one("score.kl_coef=0.1"),
@@ -219,10 +226,11 @@ impl Advice {
             }
             Self::FindDeadActions => {
                 format!(
-                    "playbot test {game} --levels {} --detector dead-action --out runs/test",
+                    "playbot test {game} --levels {} --detect dead-action --out runs/test",
                     shell_word(&context.train)
                 )
             }
+            Self::AskDemonstrator => format!("playbot imitate {game} --dagger --run runs/asked"),
             Self::UseRecordings => format!("playbot quickstart {game} --run runs/with-skills"),
             Self::KeepWins | Self::LearnSkillsLonger | Self::LowerBeta => context.learn_with(&settings),
             Self::NormaliseObservations if context.algorithm.needs_skills() => context.learn_with(&settings),
@@ -248,6 +256,8 @@ impl Advice {
             Self::MeasureBots => "measure what blind players get",
             Self::FindDeadActions => "look for actions without an effect on each level",
             Self::UseRecordings => "begin with skills from recordings, which reach the reward",
+            Self::BeCurious => "reward what is new",
+            Self::AskDemonstrator => "let a policy imitate the demonstrator, and train it further",
             Self::TrainLonger => "train for longer",
             Self::LowerRate => "lower the learning rate",
             Self::RaiseRate => "raise the learning rate",

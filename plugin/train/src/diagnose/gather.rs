@@ -10,7 +10,7 @@ use crate::{
         recordings::RecordedSet,
     },
     error::RunError,
-    experiment::Experiment,
+    experiment::{Algorithm, Experiment},
     metrics_log::EPISODES as EPISODES_TAG,
     run_dir::{OpenedRun, RunDir},
     runs::{RunCurves, RunsError},
@@ -207,7 +207,7 @@ pub fn of_game(
 
 /// Notes how little a run shows that has hardly begun.
 fn note_youth(evidence: &mut Evidence) {
-    let Some(curves) = evidence.curves.as_ref() else { return };
+    let Some(curves) = evidence.curves.as_ref().filter(|_| evidence.experiment.algorithm.is_trained()) else { return };
     let updates = curves.curve(EPISODES_TAG).len();
     let episodes = curves.last(EPISODES_TAG).unwrap_or_default();
     if updates < FEWEST_UPDATES || episodes < 1.0 {
@@ -231,7 +231,9 @@ fn begin(game: &dyn Game, experiment: &Experiment) -> Evidence {
 /// Reads the recordings that the experiment learns from, if it does and they are there.
 fn read_recordings(evidence: &mut Evidence, game: &dyn Game, gathering: &Gathering<'_>) -> Result<(), DiagnoseError> {
     let experiment = &evidence.experiment;
-    let named = experiment.demos.as_deref().filter(|_| experiment.algorithm.learns_from_demos());
+    let imitates = experiment.algorithm == Algorithm::Imitation && !experiment.imitation.dagger;
+    let learns = imitates || experiment.algorithm.learns_from_demos();
+    let named = experiment.demos.as_deref().filter(|_| learns);
     let Some(path) = named.map(gathering.recordings) else { return Ok(()) };
     if path.exists() {
         add_recordings(evidence, game, RecordedSet::read(&path)?, gathering);

@@ -87,11 +87,13 @@ fn settings(experiment: &Experiment, tag: &Tag<'_>) -> Vec<LearningFinding> {
     for (key, rate) in rates.into_iter().filter(|(_, rate)| *rate >= HIGHEST_RATE) {
         found.push(LearningFinding::new(
             Sign::LearningRate,
-            format!(
-                "`{key}` is {}, and the largest KL divergence of an update is {}",
-                readable(rate),
-                largest(tag, "approx_kl")
-            ),
+            match tag("approx_kl") {
+                [] => format!("`{key}` is {}", readable(rate)),
+                _ => {
+                    let largest = largest(tag, "approx_kl");
+                    format!("`{key}` is {}, and the largest KL divergence of an update is {largest}", readable(rate))
+                }
+            },
             "each step overwrites what the steps before have learned",
             &[Advice::LowerRate],
         ));
@@ -101,11 +103,13 @@ fn settings(experiment: &Experiment, tag: &Tag<'_>) -> Vec<LearningFinding> {
             if ppo.clip > LARGEST_CLIP { format!(", `ppo.clip` is {}", readable(ppo.clip)) } else { String::new() };
         found.push(LearningFinding::new(
             Sign::MovesTooFar,
-            format!(
-                "`ppo.epochs` is {}{clip}, and the KL divergence of the last update is {}",
-                ppo.epochs,
-                last(tag, "approx_kl")
-            ),
+            match tag("approx_kl") {
+                [] => format!("`ppo.epochs` is {}{clip}", ppo.epochs),
+                _ => {
+                    let last = last(tag, "approx_kl");
+                    format!("`ppo.epochs` is {}{clip}, and the KL divergence of the last update is {last}", ppo.epochs)
+                }
+            },
             "each rollout is learned from until the policy fits what was chance in it",
             &[Advice::FewerPasses],
         ));

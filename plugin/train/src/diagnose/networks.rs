@@ -3,7 +3,8 @@
 use crate::diagnose::play::mean;
 use bevy_playbot::skill_prior::SkillPrior;
 use playbot_learner::{
-    ActionValue, LearnError, ObsKind, Policy, PolicyOutput, Prior, SkillDraw, SkillModel, Streams, rng::normal,
+    ActionSpace, ActionValue, LearnError, ObsKind, Policy, PolicyOutput, Prior, SkillDraw, SkillModel, Streams,
+    rng::normal,
 };
 use std::{
     collections::BTreeMap,
@@ -93,7 +94,7 @@ pub fn probe_decoder(model: &SkillModel, steps: &[(&[f32], ActionValue)]) -> Res
         return Ok(None);
     }
     let (count, flat) = (steps.len(), steps.iter().flat_map(|(row, _)| row.iter().copied()).collect::<Vec<_>>());
-    let policy = model.policy();
+    let (policy, space) = (model.policy(), model.action_space());
     let mut total = vec![0.0; count];
     let draws = drawn(&model.prior(), &flat, count)?;
     for z in &draws {
@@ -102,9 +103,11 @@ pub fn probe_decoder(model: &SkillModel, steps: &[(&[f32], ActionValue)]) -> Res
             total[row] += libm::exp(f64::from(output.log_prob(row, action)?)) / draws.len() as f64;
         }
     }
-    let nll = mean(total.iter().map(|likelihood| -libm::log(likelihood.max(1e-30)))).unwrap_or_default();
+    // The decoder learns the intended actions, and recordings have noise among discrete ones.
+    let noise = if matches!(space, ActionSpace::Discrete(_)) { model.config().action_noise } else { 0.0 };
+    let noisy = |likelihood: f64| (1.0 - noise) * likelihood + noise / space.options().max(1) as f64;
+    let nll = mean(total.iter().map(|&likelihood| -libm::log(noisy(likelihood).max(1e-30)))).unwrap_or_default();
     let actions: Vec<_> = steps.iter().map(|(_, action)| action).collect();
-    let space = model.action_space();
     let margin = 0.05 * space.choices().sizes().len() as f64 + 0.5 * space.numbers() as f64;
     Ok(Some(DecoderProbe { rows: count, nll, frequencies: marginal_entropy(&actions), margin }))
 }
@@ -190,7 +193,6 @@ fn information(outputs: &[PolicyOutput], count: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use playbot_learner::ActionSpace;
 
     fn output(head: Vec<f32>) -> PolicyOutput {
         let values = vec![0.0; head.len() / 2];

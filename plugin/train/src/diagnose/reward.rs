@@ -83,6 +83,8 @@ fn too_short(evidence: &Evidence) -> Option<LearningFinding> {
     let words = match won {
         Some(ticks) if ticks > limit => format!("recorded wins take {} ticks", whole(ticks as f64)),
         Some(_) => return None,
+        // Where others lose before, to last until then may be what is wanted.
+        None if evidence.played.iter().any(|played| self::limit(played) != Some(limit)) => return None,
         None => "it never gets there, nor does anybody else".to_owned(),
     };
     Some(LearningFinding::new(
@@ -136,30 +138,30 @@ fn rare(evidence: &Evidence) -> Option<LearningFinding> {
     let curves = evidence.curves.as_ref()?;
     let episodes = curves.last(crate::metrics_log::EPISODES).filter(|episodes| *episodes >= FEWEST_EPISODES)?;
     let curve = curves.settled_or_all(crate::metrics_log::EPISODIC_RETURN);
-    let best = curve.iter().map(|(_, value)| *value).fold(f64::NEG_INFINITY, f64::max);
+    // Of the last third: a lucky window of the first episodes, of which the won ones end first, says little.
+    let best = curve[curve.len() * 2 / 3..].iter().map(|(_, value)| *value).fold(f64::NEG_INFINITY, f64::max);
     let demonstrator = evidence.played(Seat::Demonstrator)?;
     let worth = demonstrator.mean_return().filter(|worth| *worth > 0.0)?;
     (best.is_finite() && best < RARE * worth).then(|| {
         LearningFinding::new(
             Sign::RareReward,
             format!(
-                "the best mean return of {} episodes is {}, under {} of the demonstrator's {}",
+                "the best mean return in the last third of {} episodes is {}, under {} of the demonstrator's {}",
                 whole(episodes),
                 readable(best),
                 percent(RARE),
                 readable(worth)
             ),
             "the policy does not get to the reward by chance",
-            &[Advice::UseRecordings, Advice::TrainLonger, Advice::RaiseEntropy],
+            &[Advice::UseRecordings, Advice::AskDemonstrator, Advice::BeCurious, Advice::TrainLonger],
         )
     })
 }
 
 fn idling(evidence: &Evidence) -> Option<LearningFinding> {
     let nothing = evidence.played(Seat::Idle)?.mean_return().filter(|earned| *earned > 0.0)?;
-    let demonstrator = evidence.played(Seat::Demonstrator).and_then(Played::mean_return);
-    let others = [Seat::Random, Seat::Chaos].into_iter().filter_map(|seat| evidence.played(seat)?.mean_return());
-    let worth = demonstrator.unwrap_or_else(|| others.fold(f64::NEG_INFINITY, f64::max));
+    // Without a demonstrator nobody knows what good play earns: random walkers fall, and pay for standing is no fault.
+    let worth = evidence.played(Seat::Demonstrator).and_then(Played::mean_return)?;
     let success = evidence.played(Seat::Idle).and_then(Played::success).unwrap_or_default();
     (success < 0.5 && nothing >= MOST_FOR_NOTHING * worth).then(|| {
         LearningFinding::new(

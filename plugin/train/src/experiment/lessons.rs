@@ -41,8 +41,7 @@ settings! {
     pub struct LevelsConfig in "levels", read by &[];
 
     /// `Uniform`: each level is as likely as any other. `Plr(…)`: prioritised level replay, for PPO. A level is played
-    /// again the sooner, the larger the critic's errors were on it. Its values are described in
-    /// [`LevelOrder`](crate::experiment::LevelOrder).
+    /// again the sooner, the larger the critic's errors were on it. The guide to lessons explains its values.
     order: LevelOrder = LevelOrder::Uniform, such as "Plr(temperature: 0.1, staleness: 0.1, new: 0.5)";
 }
 
