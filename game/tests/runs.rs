@@ -372,10 +372,10 @@ fn a_short_quickstart_has_the_same_bytes_on_every_machine() {
         let found = files.map(|file| hash(&folder.path().join(&run).join(file)));
         let wanted = [
             0x0519_6a0f_9220_91f0,
-            0xb839_031f_c187_cd21,
-            0x03c9_719a_193b_afe9,
-            0x626c_0af2_6bb9_793e,
-            0xa82b_68d7_d9cb_7b37,
+            0x538e_08a6_aaaa_9d8a,
+            0xe0fd_4f75_da2f_93d5,
+            0x86ff_e6a7_8dcb_6881,
+            0x65b0_a1b7_e603_b82e,
         ];
         assert_eq!(found, wanted, "{found:#x?} on {threads} threads, {instructions}");
     }

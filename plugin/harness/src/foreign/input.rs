@@ -188,8 +188,8 @@ impl ForeignGame {
     /// one, bots, explorers and policies repeat it: it is the only legal action. Held keys stay pressed, while clicks
     /// and taps are made in each tick. Rewards, recordings, time limits and skill intervals count ticks, as ever.
     ///
-    /// People decide in each tick. SAC cannot learn numbers that are held. See [`DecisionPeriod`], which agents without a
-    /// `ForeignGame` may have too.
+    /// People decide in each tick. SAC cannot learn numbers that are held. Agents without a `ForeignGame` may have a
+    /// [`DecisionPeriod`](bevy_playbot::legal::DecisionPeriod), too.
     ///
     /// ```
     /// use bevy::prelude::*;
