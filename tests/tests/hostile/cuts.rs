@@ -37,7 +37,12 @@ fn cut_all(wanted: impl Fn(&&FileKind) -> bool) {
 /// Returns the lengths at which a file is cut off.
 fn lengths(kind: &FileKind) -> Vec<usize> {
     let bytes = kind.bytes();
-    let step = bytes.len().div_ceil(if kind.is_slow { SLOW_CUTS } else { CUTS });
+    let step = match kind.is_slow {
+        true => bytes.len().div_ceil(SLOW_CUTS),
+        // Each of its parts has to be seen to be kept.
+        false if kind.grows => 1,
+        false => bytes.len().div_ceil(CUTS),
+    };
     let is_wanted = |&length: &usize| {
         let ends_line = |at: usize| bytes.get(at) == Some(&b'\n');
         length.is_multiple_of(step) || ends_line(length) || (length > 0 && ends_line(length - 1))
