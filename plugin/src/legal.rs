@@ -82,6 +82,11 @@ impl LegalActions {
         }
     }
 
+    /// Creates the mask that allows every action of `space`.
+    pub fn all(space: &ActionSpace) -> Self {
+        Self::of_space(space, std::iter::repeat_n(true, space.options()))
+    }
+
     /// Creates the mask that allows this action of `space` alone.
     ///
     /// ```
@@ -92,20 +97,11 @@ impl LegalActions {
     /// assert!(legal.allows(&steer(0.5)) && !legal.allows(&steer(0.2)));
     /// ```
     pub fn only(space: &ActionSpace, action: &ActionValue) -> Self {
-        let taken = |choice: usize| match action {
-            ActionValue::Discrete(option) => Some(*option),
-            ActionValue::Continuous(_) => None,
-            ActionValue::Mixed { choices, .. } => choices.get(choice).copied(),
-        };
         let sizes = space.choices();
         let choices = sizes.sizes().iter().enumerate();
+        let taken = |choice: usize| action.options().get(choice).copied();
         let one = choices.map(|(choice, &size)| (0..size).map(move |option| taken(choice) == Some(option)));
-        let numbers = match action {
-            ActionValue::Discrete(_) => None,
-            ActionValue::Continuous(numbers) | ActionValue::Mixed { numbers, .. } => {
-                (space.numbers() > 0).then(|| numbers.clone())
-            }
-        };
+        let numbers = (space.numbers() > 0).then(|| action.numbers().to_vec());
         Self { numbers, ..Self::of_choices(one) }
     }
 
@@ -299,9 +295,7 @@ pub(crate) fn hold_decisions(
         match legal {
             Some(mut legal) => period.game = Some(std::mem::replace(&mut legal, only)),
             None => {
-                let choices = agent.actions.choices();
-                let all = choices.sizes().iter().map(|&size| std::iter::repeat_n(true, size as usize));
-                period.game = Some(LegalActions::of_choices(all));
+                period.game = Some(LegalActions::all(&agent.actions));
                 commands.entity(entity).insert(only);
             }
         }

@@ -107,9 +107,9 @@ fn add_decision_systems(app: &mut App, schedule: impl ScheduleLabel) {
                 .chain()
                 .in_set(PlaybotSystems::Begin),
             (
-                legal::return_masks,
+                legal::return_masks.run_if(any_with_component::<legal::DecisionPeriod>),
                 run_observe_schedule,
-                legal::hold_decisions,
+                legal::hold_decisions.run_if(any_with_component::<legal::DecisionPeriod>),
                 observation::check_observations,
                 vision::check_images,
                 legal::check_legal_actions,

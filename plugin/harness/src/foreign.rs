@@ -589,7 +589,7 @@ impl Game for ForeignGame {
         }
         let space = self.actions();
         if self.description.legal.is_some() && space.options() > 0 {
-            agent.insert(LegalActions::of_space(&space, std::iter::repeat_n(true, space.options())));
+            agent.insert(LegalActions::all(&space));
         }
         if self.description.input.holds() {
             agent.insert(DecisionPeriod::new(self.description.input.every.unwrap_or(1)));

@@ -119,8 +119,8 @@ impl AgentState {
 /// An agent's running episode at the end of a tick. Other agents of the game may go on from it, also in other Worlds.
 ///
 /// It has the state of the game, by [`SnapshotTools`](crate::game::SnapshotTools), and what the plugin keeps of an
-/// agent: episode, random streams, state hash, observation, action, reward, and the decision that holds. Stacks of pictures, skills, recordings
-/// and the states of bots are no part of it.
+/// agent: episode, random streams, state hash, observation, action, reward, and the decision that holds. Stacks of
+/// pictures, skills, recordings and the states of bots are no part of it.
 pub struct SavedEpisode {
     game: Snapshot,
     state: AgentState,

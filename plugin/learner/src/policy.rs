@@ -17,8 +17,8 @@ use crate::{
     device::guarded,
     legal::{held_rows, restrict},
     nn::{
-        CnnKind, HostDist, ImageNet, argmax, categorical_log_prob, frozen, gaussian_log_prob, host, matrix,
-        sample_categorical, sample_gaussian, squashed_log_prob, unsquashed_action, vector,
+        CnnKind, HostDist, ImageNet, argmax, categorical_log_prob, frozen, gaussian_log_prob, host, sample_categorical,
+        sample_gaussian, squashed_log_prob, unsquashed_action, vector,
     },
     norm::ObsStats,
 };
@@ -250,8 +250,7 @@ impl Policy {
     /// Calls `read` with the joined inputs of some states at a time and what is remembered after them, the remaining
     /// shares of their skills, and their number, until all were read.
     ///
-    /// The inputs have at least two rows. Matrix libraries sum a single row in another order than the rows of a
-    /// matrix, and a lone agent must act like one of many.
+    /// They have at least two rows, see [`Actor::remember`].
     fn for_each_chunk(
         &self,
         states: StateBatch<'_>,
@@ -283,22 +282,13 @@ impl Policy {
                 let rows: Vec<usize> = (start..(start + chunk).min(n)).collect();
                 let len = rows.len();
                 let (first, end) = (rows[0], rows[0] + len);
-                let mut x = self.actor.join(&inputs.input(&rows, &self.device))?;
+                let x = self.actor.join(&inputs.input(&rows, &self.device))?;
+                let before = memory.get(first * width..end * width).unwrap_or_default();
+                let read_by_layers = self.actor.remember(x, before, len, &self.device);
                 let mut left = left.get(first..end).map(|left| vector(left.to_vec(), &self.device));
-                let mut before = memory.get(first * width..end * width).unwrap_or_default().to_vec();
-                before.resize(len * width, 0.0);
-                let rows = len.max(2);
                 if len == 1 {
-                    (x, left) = (x.repeat_dim(0, 2), left.map(|left| left.repeat_dim(0, 2)));
-                    before.extend_from_within(..);
+                    left = left.map(|left| left.repeat_dim(0, 2));
                 }
-                let read_by_layers = match &self.actor.memory {
-                    None => (x, None),
-                    Some(memory) => {
-                        let (x, after) = memory.step(x, matrix(before, rows, width, &self.device));
-                        (x, Some(after))
-                    }
-                };
                 read(read_by_layers, left, len)?;
             }
             Ok(())
@@ -441,7 +431,7 @@ impl PolicyOutput {
     }
 
     /// Removes the illegal options of each row, `n * mask_width()`, true if legal: the others share their probability.
-    /// Numbers that are held have the log-density 0, whichever they are: whoever acts replaces drawn ones by those that
+    /// Numbers that are held have the log-density 0, whichever they are: the caller replaces drawn ones by those that
     /// the game holds. Values stay unchanged. An empty mask changes nothing.
     pub fn restrict(&mut self, legal: &[bool]) {
         restrict(&mut self.head, &self.space, legal);

@@ -138,8 +138,8 @@ impl PpoLearner {
         }
         ppo.refuse_curiosity("spirl")?;
         ppo.refuse_memory(
-            "is that of the policy over skills, and a decoder that learns below it has none: leave it `None`, \
-                           or set `spirl.learn_decoder` to false",
+            "is that of the policy over skills, and a decoder that learns below it has none: leave it `None`, or set \
+             `spirl.learn_decoder` to false",
         )?;
         learner().map(Some)
     }

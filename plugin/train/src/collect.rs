@@ -554,6 +554,9 @@ fn is_just_drawn(world: &World, entity: Entity) -> bool {
 /// Adds what the policy over skills remembered before the last draw of each agent, if it has a memory.
 fn push_skill_memories(world: &World, entities: &[Entity], rollout: &mut Rollout) {
     let width = world.get_resource::<SkillPrior>().map_or(0, |prior| prior.prior.memory());
+    if width == 0 {
+        return;
+    }
     let mut all = Vec::with_capacity(entities.len() * width);
     for (row, &entity) in entities.iter().enumerate() {
         let memory = world.get::<SkillMemory>(entity).filter(|memory| memory.before.len() == width);

@@ -227,10 +227,14 @@ impl SelfPlay {
         self.state.steps.last().copied()
     }
 
+    /// Returns the rating of the newest snapshot, if it has played a match.
+    fn newest_rating(&self) -> Option<Rating> {
+        self.ladder().members.into_iter().rfind(|member| member.step.is_some())?.rating
+    }
+
     /// Returns the rating of the newest snapshot, if it was taken at this step and has played a match.
     pub(crate) fn rating_at(&self, step: u64) -> Option<f64> {
-        let newest = self.ladder().members.into_iter().rfind(|member| member.step.is_some())?;
-        newest.rating.filter(|_| newest.step == Some(step)).map(|rating| rating.elo)
+        if self.newest_step() == Some(step) { self.newest_rating().map(|rating| rating.elo) } else { None }
     }
 
     /// Returns the table of all rivals by their ratings.
@@ -249,9 +253,8 @@ impl SelfPlay {
             scalars.push((WIN_RATE, share(MatchOutcome::Win)));
             scalars.push((DRAW_RATE, share(MatchOutcome::Draw)));
         }
-        let newest = self.ladder().members.into_iter().rfind(|member| member.step.is_some());
         // The first snapshot is not rated before there is another one.
-        if let Some(Rating { elo, error }) = newest.and_then(|member| member.rating).filter(|it| it.error > 0.0) {
+        if let Some(Rating { elo, error }) = self.newest_rating().filter(|it| it.error > 0.0) {
             scalars.extend([(ELO, elo), ("self_play/elo_error", error)]);
         }
         scalars

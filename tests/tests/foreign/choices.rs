@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 use bevy_playbot::{
     action::Actions,
-    demo::file::{DemoReader, DemoWriter},
+    demo::file::{DemoEpisode, DemoReader, DemoWriter},
     virtual_input::ActionAxis,
     vision::ObservationConfig,
 };
@@ -95,6 +95,21 @@ fn keys_of_every_choice_and_the_stick_are_held_together() {
     assert_eq!(ways, [1, 1, 1, 1, 1, 2]);
 }
 
+/// Records two levels of the demonstrator with noise, and returns the episodes after a check that they replay.
+fn recorded(game: &ForeignGame, path: &Path) -> Vec<DemoEpisode> {
+    let (mut world, agents) = build_world(game, "default", 0, 0, 1);
+    world.insert_resource(Recorder::new(DemoWriter::create(path, game.demo_header("default")).expect("fresh")));
+    game.tools().bots.attach_demonstrator(&mut world, agents[0], 0.3);
+    world.entity_mut(agents[0]).insert((Control::Bot, Recording::default(), LevelQueue::list([3, 4])));
+    while world.get::<Control>(agents[0]) != Some(&Control::Idle) {
+        world.tick().expect("sound");
+    }
+    drop(world);
+    let report = verify_file(game, path, |_| {}).expect("readable");
+    assert_eq!((report.episodes, report.divergences), (2, Vec::new()));
+    DemoReader::open(path).and_then(DemoReader::read_all).expect("whole")
+}
+
 #[test]
 fn a_demonstrator_records_what_replays_and_wins() {
     let game = hall();
@@ -103,18 +118,8 @@ fn a_demonstrator_records_what_replays_and_wins() {
     assert!(results.iter().all(|result| result.success), "{results:?}");
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("hall.demo");
-    let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
-    world.insert_resource(Recorder::new(DemoWriter::create(&path, game.demo_header("default")).expect("fresh")));
-    game.tools().bots.attach_demonstrator(&mut world, agents[0], 0.3);
-    world.entity_mut(agents[0]).insert((Control::Bot, Recording::default(), LevelQueue::list([3, 4])));
-    while world.get::<Control>(agents[0]) != Some(&Control::Idle) {
-        world.tick().expect("sound");
-    }
-    drop(world);
-    let episodes = DemoReader::open(&path).and_then(DemoReader::read_all).expect("whole");
+    let episodes = recorded(&game, &path);
     assert!(episodes.iter().all(|episode| matches!(episode.actions, Actions::Mixed { choices: 2, dim: 1, .. })));
-    let report = verify_file(&game, &path, |_| {}).expect("readable");
-    assert_eq!((report.episodes, report.divergences), (2, Vec::new()));
 }
 
 fn trainer(game: &ForeignGame, steps: u64, threads: usize) -> Trainer {
@@ -149,17 +154,7 @@ fn a_recording_of_held_actions_says_which_ticks_were_decisions() {
     let game = slow_hall();
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("hall.demo");
-    let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
-    world.insert_resource(Recorder::new(DemoWriter::create(&path, game.demo_header("default")).expect("fresh")));
-    game.tools().bots.attach_demonstrator(&mut world, agents[0], 0.3);
-    world.entity_mut(agents[0]).insert((Control::Bot, Recording::default(), LevelQueue::list([3, 4])));
-    while world.get::<Control>(agents[0]) != Some(&Control::Idle) {
-        world.tick().expect("sound");
-    }
-    drop(world);
-    let report = verify_file(&game, &path, |_| {}).expect("readable");
-    assert_eq!((report.episodes, report.divergences), (2, Vec::new()));
-    let episodes = DemoReader::open(&path).and_then(DemoReader::read_all).expect("whole");
+    let episodes = recorded(&game, &path);
     for episode in &episodes {
         for tick in (0..episode.len()).filter(|tick| tick % 3 != 0) {
             assert_eq!(episode.actions.get(tick), episode.actions.get(tick - 1), "tick {tick}");

@@ -51,7 +51,8 @@ pub struct PlayerArgs {
     /// Bot of the game, such as random. An unknown name lists all.
     #[arg(long, value_name = "NAME", group = "player")]
     bot: Option<String>,
-    /// Checkpoint of the run: last, best (highest return in training, or rating against rivals), or its number of environment steps.
+    /// Checkpoint of the run: last, best (highest return in training, or rating against
+    /// rivals), or its number of environment steps.
     #[arg(long, default_value = "last", requires = "run", conflicts_with_all = ["policy", "bot"])]
     checkpoint: CheckpointChoice,
     /// The policy takes its most probable action instead of drawing one.

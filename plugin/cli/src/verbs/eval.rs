@@ -54,7 +54,8 @@ pub struct Args {
     /// Folder of a run (repeatable).
     #[arg(long)]
     run: Vec<PathBuf>,
-    /// Checkpoint of the runs: last, best (highest return in training, or rating against rivals), or its number of environment steps.
+    /// Checkpoint of the runs: last, best (highest return in training, or rating against
+    /// rivals), or its number of environment steps.
     #[arg(long, default_value = "last")]
     checkpoint: CheckpointChoice,
     /// Skill model: measures behaviour cloning, the decoder under the prior.

@@ -65,7 +65,8 @@ struct Export {
     /// Folder of a run.
     #[arg(long, conflicts_with_all = ["experiment", "set"])]
     run: Option<PathBuf>,
-    /// Checkpoint of the run: last, best (highest return in training, or rating against rivals), or its number of environment steps.
+    /// Checkpoint of the run: last, best (highest return in training, or rating against
+    /// rivals), or its number of environment steps.
     #[arg(long, default_value = "last", conflicts_with = "skills")]
     checkpoint: CheckpointChoice,
     /// Skill model: exports behaviour cloning, the decoder under the prior.

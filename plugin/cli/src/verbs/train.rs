@@ -66,7 +66,8 @@ pub struct Args {
     /// ppo, score-ppo and spirl-ppo; the others take skills only.
     #[arg(long = "from", alias = "init-from", value_name = "RUN", conflicts_with = "resume")]
     begin_from: Option<PathBuf>,
-    /// Checkpoint of the run of --from: last, best (highest return in training, or rating against rivals), or its number of environment steps.
+    /// Checkpoint of the run of --from: last, best (highest return in training, or rating against
+    /// rivals), or its number of environment steps.
     #[arg(long, value_name = "CHECKPOINT", default_value = "last", requires = "begin_from")]
     from_checkpoint: CheckpointChoice,
     /// Go on with Adam's moments of the run of --from, too, instead of beginning them anew.

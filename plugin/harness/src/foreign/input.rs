@@ -739,11 +739,10 @@ pub(super) fn mask(world: &mut World) {
     for agent in playing_agents(world) {
         let legal = with_foreign(world, agent, |world, foreign| {
             let space = foreign.game.description.input.space();
-            let mask = match &mut foreign.asked().legal {
-                Some(system) => system.demand(world)?,
-                None => vec![true; space.options()],
-            };
-            Ok(LegalActions::of_space(&space, mask))
+            Ok(match &mut foreign.asked().legal {
+                Some(system) => LegalActions::of_space(&space, system.demand(world)?),
+                None => LegalActions::all(&space),
+            })
         });
         if let Some(legal) = legal {
             note(world, agent, Some(legal));

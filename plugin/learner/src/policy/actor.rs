@@ -5,7 +5,7 @@ use crate::{
     file::TensorFile,
     nn::{
         CnnKind, Dist, ImageNet, Init, Linear, Mlp, ObsBatch, ParamSource, ParamVisitor, Parameters, RandomInit,
-        bounded_log_std, frozen, path,
+        bounded_log_std, frozen, matrix, path,
     },
     policy::{
         NetInput,
@@ -196,6 +196,31 @@ impl Actor {
             initial = memory.warm(past.join(&burn_in.inputs)?, burn_in, initial);
         }
         Ok(memory.recall(x, recall, initial))
+    }
+
+    /// Remembers one tick of `n` agents. Takes joined inputs, `[n, latent + obs_dim]`, and the numbers that they
+    /// remembered before, `n * width`, or none for agents that begin anew. Returns what the layers read, and what is
+    /// remembered after, `[n, width]`; `None` without memory.
+    ///
+    /// Both have at least two rows. Matrix libraries sum a single row in another order than the rows of a matrix, and a
+    /// lone agent must act like one of many.
+    pub(crate) fn remember(
+        &self,
+        x: Tensor<2>,
+        before: &[f32],
+        n: usize,
+        device: &Device,
+    ) -> (Tensor<2>, Option<Tensor<2>>) {
+        let x = if n == 1 { x.repeat_dim(0, 2) } else { x };
+        let Some(memory) = &self.memory else { return (x, None) };
+        let width = memory.width();
+        let mut before = before.to_vec();
+        before.resize(n * width, 0.0);
+        if n == 1 {
+            before.extend_from_within(..);
+        }
+        let (x, after) = memory.step(x, matrix(before, n.max(2), width, device));
+        (x, Some(after))
     }
 
     /// Returns the distributions for joined inputs `[z, s]`, `[n, latent + obs_dim]`, where s is the result of

@@ -74,8 +74,9 @@ impl Dataset {
         Ok(Self { levels: levels.into(), ..self })
     }
 
-    /// Adds the masks of the actions, episode by episode, as [`Rollout::legal`](crate::Rollout::legal) has them. In an episode with an empty mask everything was legal, and it counts as legal where the mask is not known,
-    /// `None`. Masks that forbid nothing are dropped.
+    /// Adds the masks of the actions, episode by episode, as [`Rollout::legal`](crate::Rollout::legal) has them. In an
+    /// episode with an empty mask everything was legal, and it counts as legal where the mask is not known, `None`. Masks
+    /// that forbid nothing are dropped.
     ///
     /// # Errors
     /// [`LearnError::Shape`] unless there is a mask of the right length for each episode, [`LearnError::Action`] if one

@@ -3,7 +3,7 @@
 use crate::{
     LearnError, ObsKind, ObsSlice,
     device::guarded,
-    nn::{frozen, host, matrix},
+    nn::{frozen, host},
     norm::ObsStats,
     policy::{Actor, InputBuilder, Memory},
 };
@@ -121,19 +121,9 @@ impl Prior {
                 obs.check("observations of the prior", kind, n)?;
                 let inputs = InputBuilder { z: &[], latent: 0, obs, kind, stats: stats.as_deref() };
                 let pass = || {
-                    let mut x = actor.join(&inputs.input(&(0..n).collect::<Vec<_>>(), device))?;
-                    let mut before = memory.to_vec();
-                    before.resize(n * width, 0.0);
-                    if n == 1 {
-                        // As in `Policy`: a single row would be summed in another order.
-                        x = x.repeat_dim(0, 2);
-                        before.extend_from_within(..);
-                    }
-                    let mut after = Vec::new();
-                    if let Some(memory) = &actor.memory {
-                        let (seen, remembered) = memory.step(x, matrix(before, n.max(2), width, device));
-                        (x, after) = (seen, host(remembered)?);
-                    }
+                    let x = actor.join(&inputs.input(&(0..n).collect::<Vec<_>>(), device))?;
+                    let (x, after) = actor.remember(x, memory, n, device);
+                    let after = after.map_or(Ok(Vec::new()), host)?;
                     Ok((actor.forward(x).to_host()?, after))
                 };
                 let (dist, after) = kept.during(|| guarded(device, pass))?;

@@ -177,15 +177,7 @@ impl<'a> Update<'a> {
     }
 
     fn check_step(&self, i: usize, step: &StepMetrics) {
-        let mut entries = vec![
-            ("policy_loss", step.policy_loss),
-            ("value_loss", step.value_loss),
-            ("entropy", step.entropy),
-            ("total_loss", step.total_loss),
-            ("approx_kl", step.approx_kl),
-            ("clip_fraction", step.clip_fraction),
-            ("grad_norm", step.grad_norm),
-        ];
+        let mut entries = numbers(step).to_vec();
         if self.score.is_some() {
             entries.push(("kl_mean", step.decoder_kl));
             entries.push(("kl_reg", step.kl_penalty));
@@ -195,6 +187,19 @@ impl<'a> Update<'a> {
             self.case.check_entry(name, i, got);
         }
     }
+}
+
+/// Returns the numbers of a step by their names in a case.
+fn numbers(step: &StepMetrics) -> [(&'static str, f64); 7] {
+    [
+        ("policy_loss", step.policy_loss),
+        ("value_loss", step.value_loss),
+        ("entropy", step.entropy),
+        ("total_loss", step.total_loss),
+        ("approx_kl", step.approx_kl),
+        ("clip_fraction", step.clip_fraction),
+        ("grad_norm", step.grad_norm),
+    ]
 }
 
 /// Does the step of a case with its settings, and compares gradients, losses and the weights after it.
@@ -209,17 +214,8 @@ pub fn check_step(case: &Case, mut nets: PpoNets, batch: &Minibatch, score: Opti
     check_first_gradients(case, nets.clone(), batch, &config, score);
     let mut adam = Adam::new(AdamConfig { eps: case.number("adam_eps"), ..AdamConfig::default() });
     let step = gradient_step(&mut nets, &mut adam, batch, &config, score, case.number("lr")).expect("finite");
-    for (name, got) in [
-        ("policy_loss", step.policy_loss),
-        ("value_loss", step.value_loss),
-        ("entropy", step.entropy),
-        ("total_loss", step.total_loss),
-        ("approx_kl", step.approx_kl),
-        ("clip_fraction", step.clip_fraction),
-        ("grad_norm", step.grad_norm),
-        ("decoder_kl", step.decoder_kl),
-        ("kl_penalty", step.kl_penalty),
-    ] {
+    let of_penalty = [("decoder_kl", step.decoder_kl), ("kl_penalty", step.kl_penalty)];
+    for (name, got) in numbers(&step).into_iter().chain(of_penalty) {
         if case.expects(name) {
             case.check_number(name, got);
         }

@@ -74,6 +74,14 @@ fn largest(tag: &Tag<'_>, name: &str) -> String {
     values.reduce(f64::max).map_or("unknown".to_owned(), readable)
 }
 
+/// Returns the end of a sentence with a KL divergence; nothing before the first update.
+fn and_kl(tag: &Tag<'_>, what: &str, of: impl Fn(&Tag<'_>, &str) -> String) -> String {
+    match tag("approx_kl") {
+        [] => String::new(),
+        _ => format!(", and the {what} is {}", of(tag, "approx_kl")),
+    }
+}
+
 fn settings(experiment: &Experiment, tag: &Tag<'_>) -> Vec<LearningFinding> {
     let Experiment { ppo, sac, score, algorithm, .. } = experiment;
     let mut found = Vec::new();
@@ -87,13 +95,7 @@ fn settings(experiment: &Experiment, tag: &Tag<'_>) -> Vec<LearningFinding> {
     for (key, rate) in rates.into_iter().filter(|(_, rate)| *rate >= HIGHEST_RATE) {
         found.push(LearningFinding::new(
             Sign::LearningRate,
-            match tag("approx_kl") {
-                [] => format!("`{key}` is {}", readable(rate)),
-                _ => {
-                    let largest = largest(tag, "approx_kl");
-                    format!("`{key}` is {}, and the largest KL divergence of an update is {largest}", readable(rate))
-                }
-            },
+            format!("`{key}` is {}{}", readable(rate), and_kl(tag, "largest KL divergence of an update", largest)),
             "each step overwrites what the steps before have learned",
             &[Advice::LowerRate],
         ));
@@ -103,13 +105,7 @@ fn settings(experiment: &Experiment, tag: &Tag<'_>) -> Vec<LearningFinding> {
             if ppo.clip > LARGEST_CLIP { format!(", `ppo.clip` is {}", readable(ppo.clip)) } else { String::new() };
         found.push(LearningFinding::new(
             Sign::MovesTooFar,
-            match tag("approx_kl") {
-                [] => format!("`ppo.epochs` is {}{clip}", ppo.epochs),
-                _ => {
-                    let last = last(tag, "approx_kl");
-                    format!("`ppo.epochs` is {}{clip}, and the KL divergence of the last update is {last}", ppo.epochs)
-                }
-            },
+            format!("`ppo.epochs` is {}{clip}{}", ppo.epochs, and_kl(tag, "KL divergence of the last update", last)),
             "each rollout is learned from until the policy fits what was chance in it",
             &[Advice::FewerPasses],
         ));

@@ -160,7 +160,7 @@ fn rare(evidence: &Evidence) -> Option<LearningFinding> {
 
 fn idling(evidence: &Evidence) -> Option<LearningFinding> {
     let nothing = evidence.played(Seat::Idle)?.mean_return().filter(|earned| *earned > 0.0)?;
-    // Without a demonstrator nobody knows what good play earns: random walkers fall, and pay for standing is no fault.
+    // Without a demonstrator it is not known what good play earns: random walkers fall, and pay for standing is no fault.
     let worth = evidence.played(Seat::Demonstrator).and_then(Played::mean_return)?;
     let success = evidence.played(Seat::Idle).and_then(Played::success).unwrap_or_default();
     (success < 0.5 && nothing >= MOST_FOR_NOTHING * worth).then(|| {
@@ -178,7 +178,7 @@ fn ticks_of(played: &Played) -> f64 {
     mean(played.ended().map(|episode| episode.ticks() as f64)).unwrap_or_default()
 }
 
-/// Finds that episodes which are cut off earn more than those that are won, whoever plays them.
+/// Finds that episodes which are cut off earn more than those that are won, over all players.
 fn waiting(evidence: &Evidence) -> Option<LearningFinding> {
     let ended = || evidence.played.iter().flat_map(Played::ended);
     let won = ended().filter(|episode| episode.success);
@@ -212,7 +212,7 @@ fn against(evidence: &Evidence) -> Option<LearningFinding> {
     let demonstrator = evidence.played(Seat::Demonstrator)?;
     let (worth, random) = (demonstrator.mean_return()?, evidence.played(Seat::Random)?.mean_return()?);
     let wins = demonstrator.success().unwrap_or_default();
-    // Where nobody can win, as in a game that goes on until it is lost, the reward alone says what is wanted.
+    // A game that goes on until it is lost has no wins: there the better player is the one that lasts longer.
     let lasts = || ticks_of(demonstrator) > LONGER * evidence.played(Seat::Random).map_or(0.0, ticks_of);
     (worth < random - 0.1 * random.abs().max(1e-6) && (wins > 0.0 || lasts())).then(|| {
         let words = match wins > 0.0 {

@@ -28,7 +28,8 @@ pub struct TesterArgs {
     /// Folder of a run (repeatable).
     #[arg(long, value_name = "DIR")]
     run: Vec<PathBuf>,
-    /// Checkpoint of the runs: last, best (highest return in training, or rating against rivals), or its number of environment steps.
+    /// Checkpoint of the runs: last, best (highest return in training, or rating against
+    /// rivals), or its number of environment steps.
     #[arg(long, default_value = "last", requires = "run")]
     checkpoint: CheckpointChoice,
     /// Policies take their most probable action instead of drawing one.
