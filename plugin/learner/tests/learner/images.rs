@@ -111,7 +111,7 @@ fn both_backends_and_both_architectures_learn_the_same() {
     let data = Dataset::new(shape, ActionSpace::Discrete(2), episodes.collect()).expect("consistent");
     let run = |cnn: &CnnKind, device| {
         let config = SkillConfig { cnn: cnn.clone(), batch: 4, ..skill_config() };
-        train(&mut SkillTrainer::new(config, data.clone(), 1, device).expect("windows fit"), 3)
+        train(&mut SkillTrainer::new(config, data.clone(), 1, device).expect("windows fit"), 2)
     };
     for cnn in [skill_config().cnn, nature] {
         let (flex, ndarray) = (run(&cnn, DeviceKind::Flex), run(&cnn, DeviceKind::Ndarray));
