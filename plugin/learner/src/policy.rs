@@ -189,6 +189,19 @@ impl Policy {
         Ok(PolicyOutput { space, squashed, head, log_std, values, memory: after, held: Vec::new() })
     }
 
+    /// Returns the share of dead units in each hidden layer of the actor behind its encoder or trunk, from 0 to 1. A dead
+    /// unit lets no gradient through for any of the `n` observations: a ReLU that is 0, or a tanh within 0.001 of ±1.
+    ///
+    /// # Errors
+    /// As [`Self::forward`].
+    pub fn dead_units<'a>(&self, z: &[f32], obs: impl Into<ObsSlice<'a>>, n: usize) -> Result<Vec<f64>, LearnError> {
+        let mut alive = Vec::new();
+        let states = StateBatch { z, left: &[], memory: &[], obs: obs.into(), n };
+        self.for_each_chunk(states, |(x, _), _, rows| self.actor.net.mark_alive(x, rows, &mut alive))?;
+        let dead = |units: &Vec<bool>| units.iter().filter(|is_alive| !**is_alive).count() as f64 / units.len() as f64;
+        Ok(alive.iter().map(dead).collect())
+    }
+
     /// Returns only the values of [`Self::forward`]; zeros if there is no critic.
     ///
     /// # Errors

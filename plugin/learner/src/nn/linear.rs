@@ -1,6 +1,12 @@
 //! Linear layers, layer normalisation, and the multi-layer perceptron of both.
 
-use crate::nn::params::{Init, ParamSource, ParamVisitor, Parameters, RandomInit, path};
+use crate::{
+    LearnError,
+    nn::{
+        host,
+        params::{Init, ParamSource, ParamVisitor, Parameters, RandomInit, path},
+    },
+};
 use burn::tensor::{Device, Tensor, module::linear};
 use playbot_kernels::{
     dense::{Dense, dense},
@@ -204,6 +210,31 @@ impl Mlp {
         Linear::chain(x, &self.hidden().collect::<Vec<_>>())
     }
 
+    /// Marks in `alive`, for each hidden layer, the units through which a gradient goes for some of the first `rows` rows
+    /// of `x`, `[n, inputs]`.
+    ///
+    /// # Errors
+    /// [`LearnError::Device`] if the outputs cannot be read.
+    pub(crate) fn mark_alive(
+        &self,
+        mut x: Tensor<2>,
+        rows: usize,
+        alive: &mut Vec<Vec<bool>>,
+    ) -> Result<(), LearnError> {
+        for (number, layer) in self.layers.iter().enumerate() {
+            x = layer.activated(x, self.activation);
+            let width = x.dims()[1];
+            if alive.len() == number {
+                alive.push(vec![false; width]);
+            }
+            for row in host(x.clone())?.chunks(width).take(rows) {
+                let outputs = alive[number].iter_mut().zip(row);
+                outputs.for_each(|(is_alive, &output)| *is_alive |= lets_through(self.activation, output));
+            }
+        }
+        Ok(())
+    }
+
     /// Returns the hidden layers with their activations.
     fn hidden(&self) -> impl Iterator<Item = (&Linear, Option<Activation>)> {
         self.layers.iter().map(|layer| (layer, Some(self.activation)))
@@ -225,6 +256,17 @@ impl Mlp {
     }
 }
 
+/// Distance from ±1 within which a tanh lets hardly any gradient through: 0.002 of it.
+const SATURATED: f32 = 1e-3;
+
+/// Returns whether a unit with this output lets gradients through.
+fn lets_through(activation: Activation, output: f32) -> bool {
+    match activation {
+        Activation::Relu => output > 0.0,
+        Activation::Tanh => output.abs() < 1.0 - SATURATED,
+    }
+}
+
 impl Parameters for Mlp {
     fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
         for (i, layer) in self.layers.iter_mut().enumerate() {
@@ -238,7 +280,7 @@ impl Parameters for Mlp {
 mod tests {
     use super::*;
     use crate::DeviceKind;
-    use crate::nn::{host, matrix, vector};
+    use crate::nn::{matrix, vector};
 
     #[test]
     fn by_hand() {
@@ -250,5 +292,24 @@ mod tests {
         let expected = [-side, 0.5, side, 0.0, 0.5, 0.0];
         let found = host(rows.reshape([6])).expect("readable");
         assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-4), "{found:?}");
+    }
+
+    #[test]
+    fn units_that_let_no_gradient_through_are_dead() {
+        let device = DeviceKind::Flex.plain();
+        // Three units: x, -x and -1, whatever x is.
+        let layer =
+            Linear { weight: matrix(vec![1.0, -1.0, 0.0], 1, 3, &device), bias: vector(vec![0.0, 0.0, -1.0], &device) };
+        let head = Linear { weight: matrix(vec![0.0; 3], 3, 1, &device), bias: vector(vec![0.0], &device) };
+        let alive = |activation, inputs: Vec<f32>, rows| {
+            let net = Mlp { layers: vec![layer.clone()], head: head.clone(), activation };
+            let (mut alive, n) = (Vec::new(), inputs.len());
+            net.mark_alive(matrix(inputs, n, 1, &device), rows, &mut alive).expect("readable");
+            alive
+        };
+        assert_eq!(alive(Activation::Relu, vec![2.0, -3.0], 2), [[true, true, false]]);
+        assert_eq!(alive(Activation::Relu, vec![2.0, -3.0], 1), [[true, false, false]], "other rows do not count");
+        assert_eq!(alive(Activation::Tanh, vec![9.0, -9.0], 2), [[false, false, true]]);
+        assert_eq!(alive(Activation::Tanh, vec![9.0, 0.5], 2), [[true, true, true]]);
     }
 }

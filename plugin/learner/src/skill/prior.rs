@@ -55,6 +55,11 @@ impl Prior {
         Self { net: Some(PriorNet { actor: frozen(actor), observation, stats, device, kept }), latent, tanh }
     }
 
+    /// Returns the standard normal of skills like these, whatever the state.
+    pub fn whatever_the_state(&self) -> Self {
+        Self::standard_normal(self.latent, self.tanh)
+    }
+
     /// Creates a prior that ignores the state: standard normal, then tanh if `tanh`.
     pub fn standard_normal(latent: usize, tanh: bool) -> Self {
         Self { net: None, latent, tanh }

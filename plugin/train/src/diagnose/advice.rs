@@ -105,6 +105,8 @@ pub enum Advice {
     RaiseLambda,
     /// Lower the weight of the penalty.
     LowerPenalty,
+    /// Raise the weight of the penalty.
+    RaisePenalty,
     /// Normalise observations.
     NormaliseObservations,
     /// Normalise rewards.
@@ -139,7 +141,7 @@ pub enum Advice {
 
 impl Advice {
     /// All of them.
-    pub const ALL: [Self; 35] = [
+    pub const ALL: [Self; 36] = [
         Self::Doctor,
         Self::Verify,
         Self::ShowRecordings,
@@ -160,6 +162,7 @@ impl Advice {
         Self::LookAhead,
         Self::RaiseLambda,
         Self::LowerPenalty,
+        Self::RaisePenalty,
         Self::NormaliseObservations,
         Self::NormaliseRewards,
         Self::TrainCritic,
@@ -193,10 +196,11 @@ impl Advice {
             Self::AllowGradients => one("ppo.max_grad_norm=0.5"),
             Self::LowerEntropy if is_ppo => one("ppo.ent_coef=0.003"),
             Self::RaiseEntropy if is_ppo => one("ppo.ent_coef=0.03"),
-            Self::BeCurious if matches!(algorithm, Algorithm::Ppo | Algorithm::ScorePpo) => one("ppo.curiosity=Rnd()"),
+            Self::BeCurious if is_ppo && algorithm.is_trained() => one("ppo.curiosity=Rnd()"),
             Self::LookAhead => own("gamma=0.99"),
             Self::RaiseLambda => one("ppo.lambda=0.95"),
             Self::LowerPenalty => one("score.kl_coef=0.1"),
+            Self::RaisePenalty => one("score.kl_coef=1.0"),
             Self::NormaliseObservations if algorithm.needs_skills() => one("skills.norm_obs=true"),
             Self::NormaliseObservations => own("norm_obs=true"),
             Self::NormaliseRewards => own("norm_reward=true"),
@@ -267,6 +271,7 @@ impl Advice {
             Self::LookAhead => "raise the discount",
             Self::RaiseLambda => "raise λ",
             Self::LowerPenalty => "lower the weight of the penalty",
+            Self::RaisePenalty => "raise the weight of the penalty",
             Self::NormaliseObservations => "normalise the observation",
             Self::NormaliseRewards => "normalise rewards",
             Self::TrainCritic => "give the critic's loss its weight",

@@ -65,6 +65,10 @@ pub enum Sign {
     RareReward,
     /// The policy moves too far in an update.
     MovesTooFar,
+    /// Units of the policy let no gradient through.
+    DeadUnits,
+    /// The policy earns less than the decoder that it began as.
+    BelowDecoder,
     /// The policy takes the same actions whatever it draws.
     Collapsed,
     /// The policy does the same whatever it observes.
@@ -73,6 +77,8 @@ pub enum Sign {
     PartialObservation,
     /// The decoder knows its recordings no better than their frequencies.
     WeakDecoder,
+    /// Skills of the prior earn less than those of any state.
+    PoorPrior,
     /// The prior draws the same skills in every state.
     BlindPrior,
     /// All skills do the same.
@@ -115,10 +121,13 @@ impl Sign {
             Self::BlindCritic => "critic-explains-nothing",
             Self::RareReward => "reward-rarely-seen",
             Self::MovesTooFar => "policy-moves-too-far",
+            Self::DeadUnits => "dead-units",
+            Self::BelowDecoder => "policy-worse-than-decoder",
             Self::Collapsed => "policy-collapsed",
             Self::IgnoresObservation => "policy-ignores-observation",
             Self::PartialObservation => "observation-lacks-what-decides",
             Self::WeakDecoder => "decoder-worse-than-recordings",
+            Self::PoorPrior => "prior-worse-than-chance",
             Self::BlindPrior => "prior-ignores-state",
             Self::EqualSkills => "skills-all-alike",
             Self::Overfitting => "overfitting",
@@ -157,10 +166,13 @@ impl Sign {
             Self::BlindCritic => "the critic explains nothing",
             Self::RareReward => "reward is rarely seen",
             Self::MovesTooFar => "the policy moves too far",
+            Self::DeadUnits => "units of the policy are dead",
+            Self::BelowDecoder => "the policy does worse than the decoder it began as",
             Self::Collapsed => "the policy has collapsed",
             Self::IgnoresObservation => "the policy ignores what it observes",
             Self::PartialObservation => "the observation lacks what decides",
             Self::WeakDecoder => "the decoder is no better than action frequencies",
+            Self::PoorPrior => "the prior does worse than skills by chance",
             Self::BlindPrior => "the prior ignores the state",
             Self::EqualSkills => "all skills do the same",
             Self::Overfitting => "what is learned does not carry over",
@@ -205,7 +217,7 @@ impl LearningFinding {
 pub struct Diagnosis {
     /// The findings.
     pub findings: Vec<LearningFinding>,
-    /// Words about what was not looked at, and why.
+    /// Words about what was not looked at, and why, and about what was measured without a finding.
     pub notes: Vec<String>,
     /// What commands name.
     pub context: AdviceContext,

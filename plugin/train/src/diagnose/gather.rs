@@ -28,7 +28,7 @@ use playbot_harness::{
     split::LevelSplit,
 };
 use playbot_learner::{DeviceKind, FileError, HasExitCode, LearnError, Policy, SkillModel};
-use playbot_report::counted;
+use playbot_report::{counted, readable};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -112,6 +112,14 @@ pub struct Gathering<'a> {
     pub recordings: &'a dyn Fn(&Path) -> PathBuf,
 }
 
+/// What a run has trained.
+struct Trained {
+    policy: Policy,
+    prior: Option<SkillPrior>,
+    /// The decoder that the policy began as.
+    decoder: Option<Policy>,
+}
+
 /// Gathers evidence of a run, which may be in training.
 ///
 /// # Errors
@@ -144,7 +152,11 @@ pub fn of_run(
     let policy = match run.checkpoint(CheckpointChoice::Last) {
         Ok(checkpoint) if experiment.algorithm.has_checkpoints() => {
             let learner = TrainedLearner::load(info.algorithm, &checkpoint.learner_file(), gathering.device)?;
-            Some((learner.policy(), learner.skills().as_ref().map(SkillPrior::from)))
+            // A policy over skills keeps the decoder, or goes on training it: there is nothing that it began as.
+            let has_decoder = experiment.algorithm.needs_skills() && !experiment.algorithm.learns_prior();
+            let skills = learner.skills();
+            let decoder = skills.as_ref().filter(|_| has_decoder).map(|skills| skills.decoder.clone());
+            Some(Trained { policy: learner.policy(), prior: skills.as_ref().map(SkillPrior::from), decoder })
         }
         _ => {
             evidence.notes.push("the policy does not play: there is no checkpoint yet".to_owned());
@@ -264,23 +276,24 @@ fn add_recordings(evidence: &mut Evidence, game: &dyn Game, mut set: RecordedSet
 fn play_all(
     evidence: &mut Evidence,
     game: &dyn Game,
-    policy: Option<&(Policy, Option<SkillPrior>)>,
+    trained: Option<&Trained>,
     gathering: &Gathering<'_>,
 ) -> Result<(), DiagnoseError> {
     (gathering.progress)("play");
     let experiment = evidence.experiment.clone();
-    let mut jobs = jobs(game, &experiment, policy);
+    let mut jobs = jobs(game, &experiment, trained);
     let of_job = |(seat, player, plan): &mut (Seat, Player, PlayPlan)| play(game, *seat, player, plan);
     evidence.played = on_threads(&mut jobs, gathering.threads, of_job);
     let faults = evidence.played.iter().filter_map(|played| played.fault.clone());
     evidence.faults.extend(faults);
+    note_ablations(evidence);
     if evidence.faults.is_empty() {
         (gathering.progress)("force actions");
         force_actions(evidence, game);
         (gathering.progress)("examine the game");
         examine_game(evidence, game);
     }
-    if let Some((policy, prior)) = policy {
+    if let Some(Trained { policy, prior, .. }) = trained {
         let rows: Vec<&[f32]> =
             evidence.played.iter().flat_map(|played| &played.episodes).flat_map(PlayedEpisode::rows).collect();
         evidence.networks = match experiment.observation_config().is_image() {
@@ -291,12 +304,20 @@ fn play_all(
     Ok(())
 }
 
+/// Notes what the policy earns without something that was learned, which is worth knowing where nothing is wrong.
+fn note_ablations(evidence: &mut Evidence) {
+    let words = |seat: Seat| {
+        let played = evidence.played(seat)?;
+        Some(format!("{} {}", seat.name(), readable(played.mean_return()?)))
+    };
+    let without = [Seat::Decoder, Seat::AnySkill].into_iter().filter_map(words).collect::<Vec<_>>();
+    if let Some(policy) = words(Seat::Policy).filter(|_| !without.is_empty()) {
+        evidence.notes.push(format!("mean returns on the same training levels: {policy}, {}", without.join(", ")));
+    }
+}
+
 /// Returns the players with their plans.
-fn jobs(
-    game: &dyn Game,
-    experiment: &Experiment,
-    policy: Option<&(Policy, Option<SkillPrior>)>,
-) -> Vec<(Seat, Player, PlayPlan)> {
+fn jobs(game: &dyn Game, experiment: &Experiment, trained: Option<&Trained>) -> Vec<(Seat, Player, PlayPlan)> {
     let plan = |split: &LevelSplit, episodes: u64| PlayPlan {
         mode: split.mode.clone(),
         // Levels over the whole range, since the first ones may be alike.
@@ -314,10 +335,21 @@ fn jobs(
         let plan = PlayPlan { ticks: DEMONSTRATOR_TICKS, ..plan(&experiment.train, EPISODES) };
         jobs.push((Seat::Demonstrator, Player::Demonstrator, plan));
     }
-    if let Some((policy, prior)) = policy {
-        let player = Player::Policy { policy: policy.clone(), prior: prior.clone(), draw: ActionDraw::Sample };
-        jobs.push((Seat::Policy, player.clone(), plan(&experiment.train, POLICY_EPISODES)));
-        jobs.push((Seat::HeldOut, player, plan(&experiment.test, POLICY_EPISODES)));
+    if let Some(Trained { policy, prior, decoder }) = trained {
+        let of = |policy: &Policy, prior: &Option<SkillPrior>| {
+            let (policy, prior) = (policy.clone(), prior.clone());
+            Player::Policy { policy, prior, draw: ActionDraw::Sample }
+        };
+        jobs.push((Seat::Policy, of(policy, prior), plan(&experiment.train, POLICY_EPISODES)));
+        jobs.push((Seat::HeldOut, of(policy, prior), plan(&experiment.test, POLICY_EPISODES)));
+        // What training and the prior have added: the same levels without them.
+        if let Some(decoder) = decoder {
+            jobs.push((Seat::Decoder, of(decoder, prior), plan(&experiment.train, POLICY_EPISODES)));
+        }
+        if let Some(learned) = prior.as_ref().filter(|prior| prior.prior.observation().is_some()) {
+            let any = SkillPrior { prior: learned.prior.whatever_the_state(), ..learned.clone() };
+            jobs.push((Seat::AnySkill, of(policy, &Some(any)), plan(&experiment.train, POLICY_EPISODES)));
+        }
     }
     jobs
 }

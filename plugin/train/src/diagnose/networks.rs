@@ -21,6 +21,8 @@ const SKILLS: usize = 8;
 pub struct NetworkProbe {
     /// Observations that were given.
     pub rows: usize,
+    /// Share of dead units in each hidden layer of the actor, see [`Policy::dead_units`].
+    pub dead_units: Vec<f64>,
     /// Largest deviation of an output of the actor over the observations, with one skill.
     pub output_spread: f64,
     /// Mean information of the skill on the action in a state, nats; `None` without skills.
@@ -56,6 +58,7 @@ pub fn probe(
         _ => vec![0.0; latent * count],
     };
     let dim = policy.action_space().dim();
+    found.dead_units = policy.dead_units(&one, flat.as_slice(), count)?;
     found.output_spread = largest_spread(&policy.forward(&one, flat.as_slice(), count)?.head, dim);
     if latent > 0 && draws.len() > 1 {
         let outputs: Result<Vec<_>, _> = draws.iter().map(|z| policy.forward(z, flat.as_slice(), count)).collect();

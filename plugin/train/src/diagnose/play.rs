@@ -44,6 +44,10 @@ pub enum Seat {
     Demonstrator,
     /// The policy of the run, on training levels.
     Policy,
+    /// The decoder that the policy began as, with skills of the prior, on training levels.
+    Decoder,
+    /// The policy of the run with skills by chance, on training levels.
+    AnySkill,
     /// The policy of the run, on held-out levels.
     HeldOut,
 }
@@ -57,6 +61,8 @@ impl Seat {
             Self::Idle => "doing nothing",
             Self::Demonstrator => "the demonstrator",
             Self::Policy => "the policy",
+            Self::Decoder => "its decoder",
+            Self::AnySkill => "the policy with skills by chance",
             Self::HeldOut => "the policy on held-out levels",
         }
     }

@@ -4,9 +4,10 @@ use crate::diagnose::{
     advice::Advice,
     evidence::Evidence,
     finding::{LearningFinding, Sign},
-    play::{Played, Seat},
+    play::{Played, Seat, mean},
 };
 use playbot_report::{percent, readable};
+use std::collections::BTreeMap;
 
 /// Outputs that differ by less do not depend on the observation.
 const SMALLEST_OUTPUT: f64 = 1e-5;
@@ -15,14 +16,36 @@ const SMALLEST_OUTPUT: f64 = 1e-5;
 const SMALLEST_INFORMATION: f64 = 1e-3;
 const SMALLEST_PRIOR: f64 = 1e-3;
 
+/// Share of a layer's units that are dead in no sound training.
+const MOST_DEAD: f64 = 0.9;
+
+/// Fewest levels on which two players are compared, and standard errors by which their returns differ clearly.
+const FEWEST_LEVELS: usize = 8;
+const CLEAR: f64 = 4.0;
+
 /// Difference of the success on training and on held-out levels that does not come by chance in 16 episodes each: three
 /// standard errors of a difference of two shares of one half.
 const LARGEST_GAP: f64 = 0.55;
 
-/// Checks networks and the difference between training and held-out levels.
+/// Checks networks, what they add, and the difference between training and held-out levels.
 pub fn check(evidence: &Evidence) -> Vec<LearningFinding> {
     let mut found = Vec::new();
     found.extend(networks(evidence));
+    found.extend(dead_units(evidence));
+    found.extend(better_without(
+        evidence,
+        Seat::Decoder,
+        Sign::BelowDecoder,
+        "training has undone what the recordings taught: its steps are too large, or its reward leads elsewhere",
+        &[Advice::RaisePenalty, Advice::LowerRate, Advice::FewerPasses],
+    ));
+    found.extend(better_without(
+        evidence,
+        Seat::AnySkill,
+        Sign::PoorPrior,
+        "the prior draws skills that do not fit the state: the recordings are of another task, or it was learned too briefly",
+        &[Advice::RecordAgain, Advice::LearnSkillsLonger],
+    ));
     found.extend(decoder(evidence));
     found.extend(splits(evidence));
     found
@@ -60,6 +83,63 @@ fn networks(evidence: &Evidence) -> Vec<LearningFinding> {
         ));
     }
     found
+}
+
+fn dead_units(evidence: &Evidence) -> Option<LearningFinding> {
+    let probe = evidence.networks.as_ref().filter(|_| !evidence.mostly_succeeds())?;
+    let mut layers = probe.dead_units.iter().enumerate();
+    let (layer, share) = layers.find(|(_, share)| **share >= MOST_DEAD)?;
+    Some(LearningFinding::new(
+        Sign::DeadUnits,
+        format!(
+            "over {} observations, {} of the units in hidden layer {} of {} let no gradient through",
+            probe.rows,
+            percent(*share),
+            layer + 1,
+            probe.dead_units.len()
+        ),
+        "a step was too large, or the observation is, so that units are 0 or saturated whatever is observed",
+        &[Advice::LowerRate, Advice::NormaliseObservations],
+    ))
+}
+
+/// Finds that a player without something that was learned earns clearly more than the policy, on the same levels.
+fn better_without(
+    evidence: &Evidence,
+    without: Seat,
+    sign: Sign,
+    cause: &str,
+    advice: &[Advice],
+) -> Option<LearningFinding> {
+    let (policy, other) = (evidence.played(Seat::Policy)?, evidence.played(without)?);
+    let by_level = |played: &Played| -> BTreeMap<u64, f64> {
+        played.ended().map(|episode| (episode.level, episode.total())).collect()
+    };
+    let own = by_level(policy);
+    let gains: Vec<f64> = by_level(other).iter().filter_map(|(level, total)| Some(total - own.get(level)?)).collect();
+    let (gain, error) = (mean(gains.iter().copied())?, standard_error(&gains));
+    (gains.len() >= FEWEST_LEVELS && gain > CLEAR * error && gain > 0.0).then(|| {
+        LearningFinding::new(
+            sign,
+            format!(
+                "on {} training levels, {} earns {} ± {} more than the policy",
+                gains.len(),
+                without.name(),
+                readable(gain),
+                readable(error)
+            ),
+            cause,
+            advice,
+        )
+    })
+}
+
+/// Returns the standard error of the mean.
+fn standard_error(values: &[f64]) -> f64 {
+    let Some(average) = mean(values.iter().copied()) else { return 0.0 };
+    let squares: f64 = values.iter().map(|value| (value - average).powi(2)).sum();
+    let count = values.len() as f64;
+    (squares / (count * (count - 1.0).max(1.0))).sqrt()
 }
 
 fn decoder(evidence: &Evidence) -> Option<LearningFinding> {
@@ -100,6 +180,7 @@ mod tests {
     use super::*;
     use crate::diagnose::{
         networks::{DecoderProbe, NetworkProbe},
+        play::PlayedEpisode,
         testing::{evidence, played},
     };
     use bevy_playbot::episode::EpisodeEnd;
@@ -111,16 +192,54 @@ mod tests {
     #[test]
     fn networks_that_carry_nothing_are_found() {
         let mut evidence = evidence("score-ppo", "");
-        let healthy =
-            NetworkProbe { rows: 9, output_spread: 0.5, skill_information: Some(0.2), prior_spread: Some(0.1) };
+        let healthy = NetworkProbe {
+            rows: 9,
+            dead_units: vec![0.5, 0.2],
+            output_spread: 0.5,
+            skill_information: Some(0.2),
+            prior_spread: Some(0.1),
+        };
         evidence.networks = Some(healthy.clone());
         assert_eq!(signs(&evidence), []);
         evidence.networks = Some(NetworkProbe { output_spread: 0.0, ..healthy.clone() });
         assert_eq!(signs(&evidence), [Sign::IgnoresObservation]);
         evidence.networks = Some(NetworkProbe { skill_information: Some(0.0), ..healthy.clone() });
         assert_eq!(signs(&evidence), [Sign::EqualSkills]);
-        evidence.networks = Some(NetworkProbe { prior_spread: Some(0.0), ..healthy });
+        evidence.networks = Some(NetworkProbe { prior_spread: Some(0.0), ..healthy.clone() });
         assert_eq!(signs(&evidence), [Sign::BlindPrior]);
+        evidence.networks = Some(NetworkProbe { dead_units: vec![0.2, 0.95], ..healthy });
+        let found = check(&evidence);
+        assert_eq!(found[0].sign, Sign::DeadUnits);
+        assert!(found[0].evidence.contains("95.0 % of the units in hidden layer 2 of 2"), "{}", found[0].evidence);
+    }
+
+    #[test]
+    fn what_was_learned_has_to_be_worth_it() {
+        // Ten levels; a player earns what it earns on each, and a little more on every second.
+        let player = |seat: Seat, earns: f32| {
+            let mut all = played(seat, 1, |_| (vec![0.0], 0, earns));
+            let one = all.episodes.remove(0);
+            all.episodes = (0..10_u8)
+                .map(|level| PlayedEpisode {
+                    level: level.into(),
+                    rewards: vec![earns + 0.1 * f32::from(level % 2)],
+                    end: Some(EpisodeEnd::WON),
+                    ..one.clone()
+                })
+                .collect();
+            all
+        };
+        let mut evidence = evidence("score-ppo", "");
+        evidence.played = vec![player(Seat::Policy, 1.0), player(Seat::Decoder, 0.9), player(Seat::AnySkill, 1.0)];
+        assert_eq!(signs(&evidence), []);
+        evidence.played[1] = player(Seat::Decoder, 1.5);
+        assert_eq!(signs(&evidence), [Sign::BelowDecoder]);
+        evidence.played[2] = player(Seat::AnySkill, 2.0);
+        assert_eq!(signs(&evidence), [Sign::BelowDecoder, Sign::PoorPrior]);
+        // One level says nothing, however large the difference.
+        evidence.played[1].episodes.truncate(1);
+        evidence.played[2].episodes.truncate(7);
+        assert_eq!(signs(&evidence), []);
     }
 
     #[test]
