@@ -251,10 +251,23 @@ impl PpoLearner {
     /// [`LearnError::NotFinite`] and [`LearnError::Exploded`] name the number that diverged; the learner is unusable
     /// then, as after [`LearnError::DeviceFailed`].
     pub fn update(&mut self, rollout: &Rollout) -> Result<UpdateMetrics, LearnError> {
-        update_on(&self.base.device.plain(), || self.update_here(rollout))
+        self.update_of_skills(rollout, &[])
     }
 
-    fn update_here(&mut self, rollout: &Rollout) -> Result<UpdateMetrics, LearnError> {
+    /// Does [`Self::update`] with a rollout of skills, in which the rows of each environment follow one another. `chains`
+    /// holds the end of each such chain, exclusive; it is empty for a rollout of ticks.
+    ///
+    /// # Errors
+    /// As [`Self::update`].
+    pub(crate) fn update_of_skills(
+        &mut self,
+        rollout: &Rollout,
+        chains: &[usize],
+    ) -> Result<UpdateMetrics, LearnError> {
+        update_on(&self.base.device.plain(), || self.update_here(rollout, chains))
+    }
+
+    fn update_here(&mut self, rollout: &Rollout, chains: &[usize]) -> Result<UpdateMetrics, LearnError> {
         rollout.check_for(&self.base.spec, self.base.rollout_latent())?;
         let remembered = rollout.rows() * self.nets.actor.memory.as_ref().map_or(0, Memory::width);
         LearnError::check("memory of the rollout", remembered, rollout.memory.len())?;
@@ -273,7 +286,7 @@ impl PpoLearner {
         let (mut intrinsic_returns, mut curious) = (Vec::new(), None);
         if let (Some(curiosity), Some(head)) = (&mut self.curiosity, &self.nets.intrinsic) {
             let critic = self.base.snapshot(&self.nets.actor, Some(&endless_critic(&self.nets.critic, head)));
-            let judged = curiosity.update(rollout, &estimate.advantages, &critic, config, &self.base)?;
+            let judged = curiosity.update((rollout, chains), &estimate.advantages, &critic, config, &self.base)?;
             let Judged { advantages, returns, reward, predictor_loss } = judged;
             (estimate.advantages, intrinsic_returns, curious) = (advantages, returns, Some((reward, predictor_loss)));
         }

@@ -14,8 +14,8 @@ mod over_skills;
 mod skill_steps;
 
 use crate::{
-    DeviceKind, FileError, LearnError, ObsSlice, PolicySpec, PpoLearner, Rollout, SacLearner, StartFrom, TakenOver,
-    TimeLimit,
+    Curiosity, DeviceKind, FileError, LearnError, ObsSlice, PolicySpec, PpoLearner, Rollout, SacLearner, StartFrom,
+    TakenOver, TimeLimit,
     file::{FileKind, TensorFile},
     learner::{ContinuedSchedule, LearnTimes, Learner, LearnerBase, LearnerMetrics},
     policy::Policy,
@@ -47,8 +47,8 @@ pub struct SpirlLearner {
 
 impl SpirlLearner {
     /// Creates a learner of `model`'s skills by PPO. Of `score` only the skill interval counts. `ppo.gamma` is per
-    /// tick, and so is the discount of the return by which rewards are scaled, whatever `ppo.reward_gamma` is. There
-    /// is no bonus for entropy.
+    /// tick, and so are the discount of the return by which rewards are scaled, whatever `ppo.reward_gamma` is, and that
+    /// of curiosity. There is no bonus for entropy.
     ///
     /// # Errors
     /// [`LearnError::Config`] for impossible settings.
@@ -61,10 +61,10 @@ impl SpirlLearner {
         device: DeviceKind,
     ) -> Result<Self, LearnError> {
         check(&config, score, ppo.time_limit)?;
-        ppo.refuse_curiosity("spirl")?;
         let below = PpoLearner::below(&config, &ppo, score, model, seed, device)?;
         let (gamma, ent_coef) = (ppo.gamma.powi(score.skill_interval as i32), 0.0);
-        let ppo = PpoConfig { gamma, ent_coef, ..ppo };
+        let curiosity = ppo.curiosity.clone().over(score.skill_interval);
+        let ppo = PpoConfig { gamma, ent_coef, curiosity, ..ppo };
         let teacher = Teacher::new(of_prior(&config, score, true), TiedTo::Prior, model, device)?;
         let learner = PpoLearner::fresh(ppo, teacher.policy_spec(), Some(teacher), seed, device)?;
         Ok(Self { config, over_skills: OverSkills::Ppo(learner), below, advantage_sizes: Vec::new() })
@@ -132,16 +132,16 @@ impl PpoLearner {
         seed: u64,
         device: DeviceKind,
     ) -> Result<Option<Self>, LearnError> {
-        let learner = || Self::with_skill(ppo.clone(), score.clone(), model, seed, device);
+        // What is new is for the policy over skills to look for.
+        let ppo = PpoConfig { curiosity: Curiosity::Off, ..ppo.clone() };
         if !config.learn_decoder {
             return Ok(None);
         }
-        ppo.refuse_curiosity("spirl")?;
         ppo.refuse_memory(
             "is that of the policy over skills, and a decoder that learns below it has none: leave it `None`, or set \
              `spirl.learn_decoder` to false",
         )?;
-        learner().map(Some)
+        Self::with_skill(ppo, score.clone(), model, seed, device).map(Some)
     }
 }
 

@@ -27,8 +27,8 @@ const NETWORKS: &[Reader] =
 /// Those of them whose policy is over actions.
 const OVER_ACTIONS: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO, Reader::SPIRL_PPO_DECODER, Reader::SPIRL_SAC_DECODER];
 
-/// Those of them whose policy chooses an action in each tick, which may be curious.
-const IN_EACH_TICK: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO];
+/// Those of them whose policy may be curious.
+const CURIOUS: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO, Reader::SPIRL_PPO];
 
 /// Those of them whose policy may remember.
 const REMEMBERING: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO, Reader::SPIRL_PPO, Reader::IMITATION];
@@ -116,10 +116,11 @@ settings! {
     /// A reward for what is new, with a value of its own: `Off`, or `Rnd` for random network distillation (Burda et al.
     /// 2018, "Exploration by random network distillation"). `extrinsic` and `intrinsic` weigh the advantages of both
     /// rewards. `gamma` discounts the intrinsic one, whose return goes on over the ends of episodes. `share` of the
-    /// samples train the predictor, with the rate `lr`. `hidden` and `features` are its sizes.
+    /// samples train the predictor, with the rate `lr`. `hidden` and `features` are its sizes. A policy over skills is
+    /// rewarded for the state to which a skill leads; `gamma` is per tick all the same.
     curiosity: Curiosity = Curiosity::Off,
         within "`extrinsic`, `intrinsic` 0 to 1000000; `gamma` at least 0 and below 1; `share` above 0, at most 1; `lr` \
-        above 0; sizes at least 1", by IN_EACH_TICK,
+        above 0; sizes at least 1", by CURIOUS,
         such as "Rnd(extrinsic: 2.0, intrinsic: 1.0, gamma: 0.99, share: 0.25)", off "crate::settings::is_off";
 }
 
@@ -177,18 +178,6 @@ impl PpoConfig {
         let text = "must not be a Stack of sets of things, whose encoder changes while it learns: use a Gru, or set \
                     `ppo.entities` and `skills.entities` to Flat";
         Err(SettingError::new("ppo.memory", text).into())
-    }
-
-    /// Refuses an intrinsic reward, for a learner that has none.
-    ///
-    /// # Errors
-    /// [`LearnError::Setting`] if it is wanted.
-    pub(crate) fn refuse_curiosity(&self, learner: &str) -> Result<(), LearnError> {
-        if self.curiosity == Curiosity::Off {
-            return Ok(());
-        }
-        let why = format!("is for ppo and score-ppo, not for {learner}: leave it `Off`");
-        Err(SettingError::new("ppo.curiosity", why).into())
     }
 
     /// Refuses a memory, for a policy that decides below another one.

@@ -17,7 +17,7 @@ mod networks;
 mod returns;
 
 use crate::{
-    FileError, LearnError, ObsKind, Observations, Rollout,
+    EndStates, FileError, LearnError, ObsKind, Observations, Rollout,
     device::guarded,
     file::TensorFile,
     learner::LearnerBase,
@@ -33,6 +33,7 @@ use crate::{
         curiosity::{
             arrivals::Arrivals,
             networks::{RndShape, RndShapes},
+            returns::chained_gae,
         },
     },
 };
@@ -153,14 +154,14 @@ impl Rnd {
     /// Rewards what is new in a rollout, and then trains the predictor on a share of it.
     ///
     /// `extrinsic` holds the advantages of the game's rewards. `critic` plays the learner's policy with the second head
-    /// as its critic ([`endless_critic`]).
+    /// as its critic ([`endless_critic`]). `chains` are as in [`tails`].
     ///
     /// # Errors
     /// [`LearnError::Shape`] if the rollout lacks its last states; [`LearnError::NotFinite`] and
     /// [`LearnError::Exploded`] name what diverged.
     pub(super) fn update(
         &mut self,
-        rollout: &Rollout,
+        (rollout, chains): (&Rollout, &[usize]),
         extrinsic: &[f32],
         critic: &Policy,
         config: &PpoConfig,
@@ -173,9 +174,12 @@ impl Rnd {
         let (targets, errors) = self.errors(&arrivals, &stats, &device)?;
         self.rewards.update(&errors, &vec![false; errors.len()], rollout.envs)?;
         let rewards: Vec<f32> = errors.iter().map(|&error| self.rewards.scale(error)).collect();
-        let (values, next_values) = endless_values(rollout, critic)?;
+        let (values, next_values) = endless_values(rollout, chains, critic)?;
         let (gamma, lambda) = (config.curiosity.gamma(), config.lambda);
-        let endless = endless_gae(&rewards, &values, &next_values, gamma, lambda);
+        let endless = match chains {
+            [] => endless_gae(&rewards, &values, &next_values, gamma, lambda),
+            chains => chained_gae(&rewards, &values, &next_values, chains, (gamma, lambda)),
+        };
         let mut rng = base.streams.stream("curiosity.minibatches", base.updates);
         let batches = minibatches(config, rollout.rows(), &mut rng);
         let predictor_loss = self.train(&arrivals, &stats, &targets, batches, config, &device)?;
@@ -301,25 +305,87 @@ pub(super) fn endless_critic(critic: &Critic, head: &Linear) -> Critic {
     endless
 }
 
-/// Returns the intrinsic values of all rows, and of the state after the last row of each environment.
+/// The state behind the last row of an environment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Behind {
+    /// Not known yet, since an episode ended.
+    Unknown,
+    /// The number of an environment that goes on.
+    Next(usize),
+    /// The number of a state among those that were cut off.
+    Cut(usize),
+}
+
+/// Returns the last row of each environment, and the state behind it.
 ///
-/// If that row ended an episode, the next state is not known yet, and the row's own value takes its place.
-fn endless_values(rollout: &Rollout, critic: &Policy) -> Result<(Vec<f32>, Vec<f32>), LearnError> {
-    let (rows, envs, latent) = (rollout.rows(), rollout.envs, rollout.latent);
-    let values = critic.values_remembering(&rollout.z, &[], &rollout.memory, &rollout.obs, rows)?;
-    let last = rows - envs;
-    let running: Vec<usize> =
-        (0..envs).filter(|env| !rollout.terminated[last + env] && !rollout.truncated[last + env]).collect();
-    let mut next_values = values[last..].to_vec();
-    let (mut obs, mut z, mut memory) = (Observations::empty(&rollout.obs_kind), Vec::new(), Vec::new());
-    let width = rollout.memory_width();
-    for &env in &running {
-        obs.push(rollout.ends.next_obs.row(env, rollout.obs_kind.numbers()))?;
-        z.extend_from_slice(rollout.ends.next_z.get(env * latent..(env + 1) * latent).unwrap_or_default());
-        memory.extend_from_slice(rollout.ends.next_memory.get(env * width..(env + 1) * width).unwrap_or_default());
+/// `chains` is empty for a rollout of ticks. In one of skills the rows of each environment follow one another: then it holds
+/// the end of each such chain, exclusive. The last skill of a chain is cut off, though its episode may go on.
+fn tails(rollout: &Rollout, chains: &[usize]) -> Vec<(usize, Behind)> {
+    let is_done = |row: usize| rollout.terminated[row] || rollout.truncated[row];
+    let first = rollout.rows() - rollout.envs;
+    let of_env = |env| (first + env, if is_done(first + env) { Behind::Unknown } else { Behind::Next(env) });
+    let of_chain = |&end: &usize| {
+        let cut = rollout.ends.cut_rows.binary_search(&(end - 1));
+        (end - 1, cut.map_or(Behind::Unknown, Behind::Cut))
+    };
+    match chains {
+        [] => (0..rollout.envs).map(of_env).collect(),
+        chains => chains.iter().map(of_chain).collect(),
     }
-    for (&env, value) in running.iter().zip(critic.values_remembering(&z, &[], &memory, &obs, running.len())?) {
-        next_values[env] = value;
+}
+
+/// Returns the intrinsic values of all rows, and of the state after the last row of each environment or chain. Where that
+/// is not known, the row's own value takes its place.
+fn endless_values(rollout: &Rollout, chains: &[usize], critic: &Policy) -> Result<(Vec<f32>, Vec<f32>), LearnError> {
+    let (rows, latent, width) = (rollout.rows(), rollout.latent, rollout.memory_width());
+    let values = critic.values_remembering(&rollout.z, &[], &rollout.memory, &rollout.obs, rows)?;
+    let (mut obs, mut z, mut memory) = (Observations::empty(&rollout.obs_kind), Vec::new(), Vec::new());
+    let (mut next_values, mut known) = (Vec::new(), Vec::new());
+    let EndStates { next_obs, next_z, next_memory, cut_obs, cut_z, cut_memory, .. } = &rollout.ends;
+    for (tail, (row, behind)) in tails(rollout, chains).into_iter().enumerate() {
+        next_values.push(values[row]);
+        let (at, all, skills, memories) = match behind {
+            Behind::Unknown => continue,
+            Behind::Next(env) => (env, next_obs, next_z, next_memory),
+            Behind::Cut(cut) => (cut, cut_obs, cut_z, cut_memory),
+        };
+        known.push(tail);
+        obs.push(all.row(at, rollout.obs_kind.numbers()))?;
+        z.extend_from_slice(skills.get(at * latent..(at + 1) * latent).unwrap_or_default());
+        memory.extend_from_slice(memories.get(at * width..(at + 1) * width).unwrap_or_default());
+    }
+    for (&tail, value) in known.iter().zip(critic.values_remembering(&z, &[], &memory, &obs, known.len())?) {
+        next_values[tail] = value;
     }
     Ok((values, next_values))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ActionSpace, Actions};
+
+    #[test]
+    fn a_chain_of_skills_ends_where_its_environment_does() {
+        let n = 5;
+        let mut skills = Rollout {
+            steps: n,
+            obs: vec![0.0; n].into(),
+            actions: Actions::Continuous { dim: 1, values: vec![0.0; n] },
+            log_probs: vec![0.0; n],
+            values: vec![0.0; n],
+            rewards: vec![0.0; n],
+            terminated: vec![true, false, false, false, true],
+            truncated: vec![false, true, true, false, false],
+            final_values: vec![0.0; n],
+            next_values: vec![0.0],
+            ..Rollout::new(1, 1, 0, &ActionSpace::Continuous(1))
+        };
+        skills.ends.cut_rows = vec![1, 2];
+        let expected = [(2, Behind::Cut(1)), (4, Behind::Unknown)];
+        assert_eq!(tails(&skills, &[3, 5]), expected, "ends of episodes within a chain are none of it");
+        assert_eq!(tails(&skills, &[]), [(4, Behind::Unknown)]);
+        skills.terminated[4] = false;
+        assert_eq!(tails(&skills, &[]), [(4, Behind::Next(0))]);
+    }
 }

@@ -82,7 +82,7 @@ impl OverSkills {
             }
             Self::Ppo(learner) => {
                 let rewards = scaled(learner.base.rewards.as_mut(), gamma, rollout)?;
-                let SkillRollout { rows: mut skills, discounts, drawn_at } =
+                let SkillRollout { rows: mut skills, discounts, drawn_at, chains } =
                     skill_rollout(rollout, &rewards, gamma, skill_interval)?;
                 if let (true, Actions::Continuous { values, .. }) = (tanh, &mut skills.actions) {
                     // PPO does not squash: its actions are the normal numbers whose tanh the decoder reads.
@@ -92,7 +92,7 @@ impl OverSkills {
                 discount_cuts(&mut skills, &discounts, learner.config().gamma);
                 let is_warming_up = learner.updates() < learner.config().critic_warmup;
                 let normalizer = learner.base.rewards.take();
-                let metrics = learner.update(&skills);
+                let metrics = learner.update_of_skills(&skills, &chains);
                 learner.base.rewards = normalizer;
                 let metrics = metrics?;
                 advantage_sizes.clear();
@@ -181,6 +181,10 @@ pub(super) fn tag_of_skills(tag: &'static str) -> Option<&'static str> {
         "losses/actor_loss" => "spirl/actor_loss",
         "losses/actor_grad_norm" => "spirl/actor_grad_norm",
         "losses/entropy" => "spirl/entropy",
+        // A decoder that learns below is not curious, so these keep their names.
+        "losses/intrinsic_value_loss" => tag,
+        "curiosity/intrinsic_reward" => tag,
+        "curiosity/predictor_loss" => tag,
         "score/decoder_kl" => "spirl/prior_kl",
         _ => return None,
     })

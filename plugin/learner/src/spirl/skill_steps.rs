@@ -36,6 +36,8 @@ pub(super) struct SkillRollout {
     pub(super) discounts: Vec<f64>,
     /// The row of the rollout of ticks in which each skill was drawn.
     pub(super) drawn_at: Vec<usize>,
+    /// The end of each environment's rows, exclusive, for environments that played a skill.
+    pub(super) chains: Vec<usize>,
 }
 
 /// Returns the rollout in terms of skills, in one environment: each row is a state in which a skill was drawn. The
@@ -63,7 +65,7 @@ pub(super) fn skill_rollout(
     LearnError::check("rewards of skills", rollout.rows(), rewards.len())?;
     let latent = rollout.latent;
     let mut skills = Rollout { envs: 1, ..Rollout::new(1, rollout.obs_kind, 0, &ActionSpace::Continuous(latent)) };
-    let (mut drawn, mut discounts, mut drawn_at) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut drawn, mut discounts, mut drawn_at, mut chains) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for env in 0..rollout.envs {
         let steps = skill_steps(rollout, rewards, env, gamma, skill_interval);
         for (i, step) in steps.iter().enumerate() {
@@ -72,6 +74,9 @@ pub(super) fn skill_rollout(
             drawn.extend_from_slice(&rollout.z[step.row * latent..(step.row + 1) * latent]);
             discounts.push(step.discount);
             drawn_at.push(step.row);
+        }
+        if !steps.is_empty() {
+            chains.push(skills.steps);
         }
     }
     if skills.steps == 0 {
@@ -84,7 +89,7 @@ pub(super) fn skill_rollout(
     skills.next_values = vec![0.0];
     skills.ends.next_obs.push(rollout.obs.row(0, rollout.obs_kind.numbers()))?;
     skills.ends.next_memory = vec![0.0; rollout.memory_width()];
-    Ok(SkillRollout { rows: skills, discounts, drawn_at })
+    Ok(SkillRollout { rows: skills, discounts, drawn_at, chains })
 }
 
 /// Returns the skills that an environment has played to their ends, among those with enough time for it.
@@ -189,8 +194,9 @@ mod tests {
 
     #[test]
     fn by_hand() {
-        let SkillRollout { rows: skills, discounts, drawn_at } = skills_of(&rollout(1.0), 2).expect("there are some");
-        assert_eq!(drawn_at, [1, 3, 4, 6, 7]);
+        let SkillRollout { rows: skills, discounts, drawn_at, chains } =
+            skills_of(&rollout(1.0), 2).expect("there are some");
+        assert_eq!((drawn_at, chains), (vec![1, 3, 4, 6, 7], vec![5]));
         assert_eq!(discounts, [0.25, 0.5, 0.25, 0.5, 0.25], "the second and the fourth were played for one tick");
         skills.check().expect("it fits");
         assert_eq!(skills.obs, vec![1.0, 3.0, 4.0, 6.0, 7.0].into());

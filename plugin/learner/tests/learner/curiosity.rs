@@ -7,7 +7,7 @@ use crate::{image_task, pixels, score};
 use playbot_learner::rng::{ChaCha8Rng, Streams};
 use playbot_learner::{
     ActionSpace, ActionValue, Curiosity, DeviceKind, EndStates, Learner, Policy, PolicyFile, PolicyMetadata,
-    PolicySpec, PpoConfig, PpoLearner, Rollout, ScoreConfig, SpirlConfig, SpirlLearner, StartFrom,
+    PolicySpec, PpoConfig, PpoLearner, Rollout, ScoreConfig, StartFrom,
 };
 
 /// Places of a lock; the last one is open.
@@ -238,13 +238,6 @@ fn what_cannot_be_curious_says_so() {
     let lacking = Rollout { ends: EndStates::new(&toy::OBS.into()), ..rollout };
     let error = learner.update(&lacking).expect_err("no last states").to_string();
     assert!(error.contains("next_obs"), "{error}");
-    let refused = |spirl: SpirlConfig| {
-        let ppo = curious(config());
-        let learner = SpirlLearner::ppo(spirl, ppo, &ScoreConfig::default(), &score::model(1), 1, DeviceKind::Flex);
-        learner.expect_err("policies over skills are not curious").to_string()
-    };
-    let error = refused(SpirlConfig::default());
-    assert!(error.contains("`ppo.curiosity` is for ppo and score-ppo, not for spirl"), "{error}");
     let impossible = PpoConfig { curiosity: Curiosity::rnd(), lambda: 2.0, ..config() };
     assert!(impossible.validate().is_err());
 }

@@ -18,17 +18,29 @@ pub struct Rules {
     pub limit: usize,
     /// Steps at the beginning of an episode in which the goal is seen.
     pub shown: usize,
+    /// Place and goal of every episode; `None` to draw them.
+    pub route: Option<[[f32; 2]; 2]>,
     /// Reward of a step, by the distances before and after it.
     pub reward: fn(f32, f32) -> f32,
 }
 
 /// Each step costs the remaining distance.
-pub static HURRY: Rules = Rules { speed: 0.2, near: 0.15, limit: 30, shown: usize::MAX, reward: |_, after| -after };
+pub static HURRY: Rules =
+    Rules { speed: 0.2, near: 0.15, limit: 30, shown: usize::MAX, route: None, reward: |_, after| -after };
 /// Coming nearer is rewarded.
 pub static WALK: Rules =
-    Rules { speed: 0.1, near: 0.25, limit: 40, shown: usize::MAX, reward: |before, after| before - after };
+    Rules { speed: 0.1, near: 0.25, limit: 40, shown: usize::MAX, route: None, reward: |before, after| before - after };
 /// The same, with a goal that is seen once.
 pub static RECALL: Rules = Rules { shown: 1, ..WALK };
+/// A goal that is not seen, in the opposite corner, and pays when it is reached.
+pub static FAR: Rules = Rules {
+    speed: 0.07,
+    near: 0.4,
+    limit: 60,
+    shown: 0,
+    route: Some([[-0.9, -0.9], [0.9, 0.9]]),
+    reward: |_, after| if after < 0.4 { 1.0 } else { 0.0 },
+};
 
 /// A point at (x, y) in [-1, 1]² and its goal; the action is a velocity.
 #[derive(Clone, Copy)]
@@ -42,6 +54,14 @@ impl Point {
     pub fn new(rng: &mut ChaCha8Rng) -> Self {
         let mut draw = || [(); 2].map(|()| 2.0 * unit(rng) as f32 - 1.0);
         Self { place: draw(), goal: draw(), time: 0 }
+    }
+
+    /// Begins an episode of these rules.
+    fn begin(rules: &Rules, rng: &mut ChaCha8Rng) -> Self {
+        match rules.route {
+            Some([place, goal]) => Self { place, goal, time: 0 },
+            None => Self::new(rng),
+        }
     }
 
     pub fn observe(&self) -> [f32; OBS] {
@@ -94,7 +114,7 @@ impl Field {
     pub fn new(rules: &'static Rules, envs: usize, seed: u64) -> Self {
         let streams = Streams::new(seed);
         let mut rngs: Vec<_> = (0..envs as u64).map(|i| streams.stream("point", i)).collect();
-        let points = rngs.iter_mut().map(Point::new).collect();
+        let points = rngs.iter_mut().map(|rng| Point::begin(rules, rng)).collect();
         Self { rules, points, rngs, skills: vec![Held::default(); envs], reached: Vec::new() }
     }
 
@@ -156,7 +176,7 @@ impl Field {
                 }
                 if tick.is_done(row) {
                     self.reached.push(tick.terminated[row]);
-                    self.points[row] = Point::new(&mut self.rngs[row]);
+                    self.points[row] = Point::begin(self.rules, &mut self.rngs[row]);
                     (self.skills[row].left, self.skills[row].now) = (0, Vec::new());
                 }
             }

@@ -1,6 +1,6 @@
 //! SPiRL: a policy over skills that start as the prior, learned by PPO and by SAC.
 
-use crate::field::{Field, RECALL, SPACE, WALK};
+use crate::field::{FAR, Field, RECALL, SPACE, WALK};
 use crate::walkers::skills_of_directions;
 use playbot_learner::rng::{Streams, normal};
 use playbot_learner::{
@@ -213,6 +213,59 @@ fn a_restart_goes_on_to_the_bit() {
             assert_eq!(bytes(&learner), bytes(&loaded));
         }
     }
+}
+
+/// Returns a learner that is paid for nothing but what is new.
+fn curious(spirl: SpirlConfig, seed: u64) -> SpirlLearner {
+    let lone = r#"{"Rnd":{"extrinsic":0.0,"gamma":0.95}}"#;
+    let curiosity = serde_json::from_str(lone).expect("the rest is default");
+    let config = PpoConfig { curiosity, ..ppo_config() };
+    SpirlLearner::ppo(spirl, config, &score(), &MODEL, seed, DeviceKind::Flex).expect("good settings")
+}
+
+#[test]
+fn a_curious_policy_over_skills_predicts_what_it_has_seen_and_goes_on_to_the_bit() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("checkpoint.safetensors");
+    for learn_decoder in [false, true] {
+        let mut learner = curious(SpirlConfig { learn_decoder, ..SpirlConfig::default() }, 1);
+        let first = number(&train(&mut learner, 1, 64), "curiosity/predictor_loss");
+        let later = train(&mut learner, 30, 64);
+        let last = number(&later, "curiosity/predictor_loss");
+        assert!(0.0 < last && last < 0.5 * first, "the error falls from {first} to {last}");
+        for tag in ["curiosity/intrinsic_reward", "losses/intrinsic_value_loss"] {
+            assert!(number(&later, tag) > 0.0, "{tag}");
+        }
+        learner.save(&path).expect("written");
+        let mut loaded = SpirlLearner::load(&path, DeviceKind::Flex).expect("read");
+        assert_eq!(train(&mut learner, 2, 32), train(&mut loaded, 2, 32));
+        let bytes = |learner: &SpirlLearner| {
+            learner.save(&path).expect("written");
+            std::fs::read(&path).expect("readable")
+        };
+        assert_eq!(bytes(&learner), bytes(&loaded));
+    }
+}
+
+#[test]
+fn curiosity_leads_to_places_that_skills_by_chance_do_not_reach() {
+    let reached = |learns: bool, seed: u64| {
+        let mut learner = curious(SpirlConfig { target_kl: Some(3.0), ..SpirlConfig::default() }, seed);
+        let mut far = Field::new(&FAR, 16, seed);
+        for _ in 0..80 {
+            let rollout = far.rollout(&learner, 64);
+            if learns {
+                learner.learn(&rollout).expect("finite");
+            }
+        }
+        far.reached.iter().filter(|reached| **reached).count()
+    };
+    let of_seeds = |learns| (1..=3).map(|seed| reached(learns, seed)).collect::<Vec<_>>();
+    let (by_chance, curious) = (of_seeds(false), of_seeds(true));
+    assert!(
+        by_chance.iter().all(|count| *count < 5) && curious.iter().all(|count| *count > 40),
+        "{by_chance:?} {curious:?}"
+    );
 }
 
 #[test]

@@ -81,6 +81,18 @@ impl Curiosity {
         }
     }
 
+    /// Returns these settings for steps that each take so many ticks.
+    #[must_use]
+    pub(crate) fn over(self, ticks: usize) -> Self {
+        match self {
+            Self::Off => Self::Off,
+            Self::Rnd { extrinsic, intrinsic, gamma, share, lr, hidden, features } => {
+                let gamma = libm::pow(gamma, ticks as f64);
+                Self::Rnd { extrinsic, intrinsic, gamma, share, lr, hidden, features }
+            }
+        }
+    }
+
     /// Checks that these settings are possible.
     ///
     /// # Errors

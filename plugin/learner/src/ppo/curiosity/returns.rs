@@ -26,6 +26,26 @@ pub fn endless_gae(rewards: &[f32], values: &[f32], next_values: &[f32], gamma: 
     Advantages { advantages, returns }
 }
 
+/// Computes [`endless_gae`] of environments whose rows follow one another. `chains` holds the end of each, exclusive, and
+/// `next_values` the value behind it.
+pub(super) fn chained_gae(
+    rewards: &[f32],
+    values: &[f32],
+    next_values: &[f32],
+    chains: &[usize],
+    (gamma, lambda): (f64, f64),
+) -> Advantages {
+    let mut all = Advantages { advantages: Vec::new(), returns: Vec::new() };
+    let mut start = 0;
+    for (&end, &next_value) in chains.iter().zip(next_values) {
+        let of_chain = endless_gae(&rewards[start..end], &values[start..end], &[next_value], gamma, lambda);
+        all.advantages.extend(of_chain.advantages);
+        all.returns.extend(of_chain.returns);
+        start = end;
+    }
+    all
+}
+
 /// Returns w · A + v · B for advantages A of the game and B of intrinsic rewards, and their `weights` (w, v).
 pub fn combined_advantages(extrinsic: &[f32], intrinsic: &[f32], weights: (f64, f64)) -> Vec<f32> {
     let sum = |(&a, &b): (&f32, &f32)| (weights.0 * f64::from(a) + weights.1 * f64::from(b)) as f32;
@@ -45,6 +65,10 @@ mod tests {
         // A second environment lies between the rows of the first.
         let found = endless_gae(&[1.0, 0.0, 3.0, 0.0], &[2.0, 0.0, 4.0, 0.0], &[8.0, 0.0], 0.5, 0.5);
         assert_eq!(found.advantages, [1.75, 0.0, 3.0, 0.0]);
+        // The same behind a chain of one row: 1 + 2/2 - 0 = 2.
+        let (rewards, values, next_values) = ([1.0, 1.0, 3.0], [0.0, 2.0, 4.0], [2.0, 8.0]);
+        let found = chained_gae(&rewards, &values, &next_values, &[1, 3], (0.5, 0.5));
+        assert_eq!((found.advantages, found.returns), (vec![2.0, 1.75, 3.0], vec![2.0, 3.75, 7.0]));
     }
 
     #[test]
