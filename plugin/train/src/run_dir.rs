@@ -25,7 +25,7 @@ use crate::{
     },
     levels::LevelState,
     metrics_log::{MetricsLog, UpdateReport},
-    self_play::{SelfPlayState, read_snapshots},
+    self_play::{SelfPlayState, Snapshot, read_snapshots},
     trainer,
     trainer::{Progress, TrainedLearner, Trainer},
 };
@@ -37,7 +37,7 @@ use playbot_harness::{
         write_sealed,
     },
 };
-use playbot_learner::{DeviceKind, Policy, SeenLevels, disk, disk::DiskFile, seal_text};
+use playbot_learner::{DeviceKind, SeenLevels, disk, disk::DiskFile, seal_text};
 use serde::{Deserialize, Serialize};
 use std::{
     ffi::OsString,
@@ -97,7 +97,7 @@ struct TrainState {
 }
 
 /// A checkpoint that was read: its learner, its state, and the policies of its rivals.
-type ReadCheckpoint = (TrainedLearner, TrainState, Vec<(usize, Policy)>);
+type ReadCheckpoint = (TrainedLearner, TrainState, Vec<(usize, Snapshot)>);
 
 /// An open folder of a run.
 pub struct RunDir {
@@ -240,9 +240,9 @@ impl RunDir {
             let (progress, levels) = (trainer.progress.clone(), trainer.level_state());
             let (arenas, self_play) = (trainer.save_arenas(), trainer.self_play_state());
             if let Some(rivals) = trainer.self_play() {
-                let (experiment, skills) = (trainer.experiment(), trainer.skill_source());
+                let experiment = trainer.experiment();
                 let (observation, algorithm) = (experiment.observation_config(), experiment.algorithm.name());
-                rivals.save(&fresh.path, self_play.as_ref(), &observation, skills.as_ref(), algorithm)?;
+                rivals.save(&fresh.path, self_play.as_ref(), &observation, algorithm)?;
                 rivals.ladder().write(&self.path)?;
             }
             Ok(write_sealed(&fresh.arenas_file(), &TrainState { progress, arenas, levels, self_play })?)

@@ -29,7 +29,7 @@ use playbot_harness::{
         scripted_rival,
     },
 };
-use playbot_learner::{DeviceKind, FileError, Observations, Policy, PolicyFile, PolicyMetadata, SkillSource};
+use playbot_learner::{DeviceKind, FileError, Learner, Observations, Policy, PolicyFile, PolicyMetadata, SkillSource};
 use playbot_report::ratings::{Encounter, Rating};
 use serde::{Deserialize, Serialize};
 use std::{
@@ -60,6 +60,26 @@ pub(crate) struct SelfPlayState {
     arenas: Vec<ArenaRivals>,
 }
 
+/// What a run has learned by some moment, as a rival.
+#[derive(Clone)]
+pub(crate) struct Snapshot {
+    pub(crate) policy: Policy,
+    /// The source of its skills, which SPiRL goes on learning; `None` without skills.
+    pub(crate) skills: Option<SkillSource>,
+}
+
+impl Snapshot {
+    /// Takes a snapshot of a learner.
+    pub(crate) fn of(learner: &dyn Learner) -> Self {
+        Self { policy: learner.policy(), skills: learner.skills() }
+    }
+
+    fn player(&self) -> Player {
+        let prior = self.skills.as_ref().map(SkillPrior::from);
+        Player::Policy { policy: self.policy.clone(), prior, draw: ActionDraw::Sample }
+    }
+}
+
 /// A training against rivals.
 pub(crate) struct SelfPlay {
     config: SelfPlayConfig,
@@ -70,20 +90,14 @@ pub(crate) struct SelfPlay {
     seed: u64,
     bots: Vec<(String, Player)>,
     /// Snapshots that play, each with its number among all, the oldest first.
-    snapshots: Vec<(usize, Policy)>,
-    prior: Option<SkillPrior>,
+    snapshots: Vec<(usize, Snapshot)>,
     state: SelfPlayState,
 }
 
 impl SelfPlay {
     /// Prepares a training against rivals, without a snapshot yet; `None` for one without rivals. The experiment was
     /// checked with the game.
-    pub(crate) fn new(
-        game: &dyn Game,
-        experiment: &Experiment,
-        prior: Option<SkillPrior>,
-        threads: usize,
-    ) -> Result<Option<Self>, TrainError> {
+    pub(crate) fn new(game: &dyn Game, experiment: &Experiment, threads: usize) -> Result<Option<Self>, TrainError> {
         let config = experiment.self_play.clone();
         if config.every.is_none() {
             return Ok(None);
@@ -107,7 +121,7 @@ impl SelfPlay {
         let bots = bots.collect();
         let (snapshots, state) = (Vec::new(), SelfPlayState::default());
         let seats = seats.map_err(|error: RivalError| TrainError::Rivals(Box::new(error.into())))?;
-        Ok(Some(Self { config, seats, rating, seed: experiment.seed, bots, snapshots, prior, state }))
+        Ok(Some(Self { config, seats, rating, seed: experiment.seed, bots, snapshots, state }))
     }
 
     /// Returns the game as the agent of this number meets it.
@@ -125,22 +139,18 @@ impl SelfPlay {
         self.bots.len() + snapshot
     }
 
-    fn player(&self, policy: &Policy) -> Player {
-        Player::Policy { policy: policy.clone(), prior: self.prior.clone(), draw: ActionDraw::Sample }
-    }
-
     /// Returns the snapshots that are drawn: the newest of them.
-    fn drawn(&self) -> &[(usize, Policy)] {
+    fn drawn(&self) -> &[(usize, Snapshot)] {
         &self.snapshots[self.snapshots.len().saturating_sub(pool_of(&self.config))..]
     }
 
     /// Returns the rivals of the next episodes; `None` before the first snapshot.
     pub(crate) fn pool(&self) -> Option<RivalPool> {
-        let (newest, policy) = self.snapshots.last()?;
-        let newest = (self.number(*newest), self.player(policy));
+        let (newest, snapshot) = self.snapshots.last()?;
+        let newest = (self.number(*newest), snapshot.player());
         let bots = self.bots.iter().take(self.config.rivals.len()).enumerate();
         let bots = bots.map(|(number, (_, player))| (number, player.clone()));
-        let snapshots = self.drawn().iter().map(|(it, policy)| (self.number(*it), self.player(policy)));
+        let snapshots = self.drawn().iter().map(|(it, snapshot)| (self.number(*it), snapshot.player()));
         let has_snapshots = !self.drawn().is_empty();
         let latest = if has_snapshots { self.config.latest } else { 0.0 };
         Some(RivalPool { seed: self.seed, latest, newest, all: bots.chain(snapshots).collect() })
@@ -152,18 +162,18 @@ impl SelfPlay {
             return Some(player.clone());
         }
         let kept = self.snapshots.iter().find(|(snapshot, _)| self.number(*snapshot) == number);
-        kept.map(|(_, policy)| self.player(policy))
+        kept.map(|(_, snapshot)| snapshot.player())
     }
 
     /// Takes the first snapshot, if there is none yet.
-    pub(crate) fn begin(&mut self, policy: &Policy) {
+    pub(crate) fn begin(&mut self, learner: &dyn Learner) {
         if self.state.steps.is_empty() {
-            self.add(0, policy);
+            self.add(0, Snapshot::of(learner));
         }
     }
 
-    fn add(&mut self, step: u64, policy: &Policy) {
-        self.snapshots.push((self.state.steps.len(), policy.clone()));
+    fn add(&mut self, step: u64, snapshot: Snapshot) {
+        self.snapshots.push((self.state.steps.len(), snapshot));
         self.state.steps.push(step);
     }
 
@@ -184,14 +194,14 @@ impl SelfPlay {
         &mut self,
         [before, step]: [u64; 2],
         is_done: bool,
-        policy: &Policy,
+        learner: &dyn Learner,
         playing: &[ArenaRivals],
     ) -> Result<(), TrainError> {
         let every = self.config.every.unwrap_or(u64::MAX);
         if before / every == step / every && !is_done {
             return Ok(());
         }
-        self.add(step, policy);
+        self.add(step, Snapshot::of(learner));
         self.rate_newest()?;
         let all = self.state.steps.len();
         let config = &self.config;
@@ -201,14 +211,14 @@ impl SelfPlay {
 
     /// Plays the newest snapshot against all bots, and against those before it that are rivals.
     fn rate_newest(&mut self) -> Result<(), TrainError> {
-        let Some((newest, policy)) = self.snapshots.last() else { return Ok(()) };
-        let (one, player) = (self.number(*newest), self.player(policy));
+        let Some((newest, snapshot)) = self.snapshots.last() else { return Ok(()) };
+        let (one, player) = (self.number(*newest), snapshot.player());
         if self.rating.levels.is_empty() {
             return Ok(());
         }
         let first = newest.saturating_sub(pool_of(&self.config).max(1));
-        let earlier = self.snapshots.iter().filter(|(snapshot, _)| (first..*newest).contains(snapshot));
-        let earlier = earlier.map(|(snapshot, policy)| (self.number(*snapshot), self.player(policy)));
+        let earlier = self.snapshots.iter().filter(|(number, _)| (first..*newest).contains(number));
+        let earlier = earlier.map(|(number, snapshot)| (self.number(*number), snapshot.player()));
         let bots = self.bots.iter().enumerate().map(|(number, (_, player))| (number, player.clone()));
         let mut met = Vec::new();
         for (other, rival) in bots.chain(earlier) {
@@ -277,13 +287,12 @@ impl SelfPlay {
         folder: &Path,
         state: Option<&SelfPlayState>,
         observation_config: &ObservationConfig,
-        skills: Option<&SkillSource>,
         algorithm: &str,
     ) -> Result<(), FileError> {
         let (all, playing) = (self.state.steps.len(), state.map_or(&[][..], |state| &state.arenas));
         let kept = self.snapshots.iter().filter(|(it, _)| is_kept(*it, all, &self.config, playing));
-        for (snapshot, policy) in kept {
-            let step = self.state.steps.get(*snapshot).copied().unwrap_or_default();
+        for (number, snapshot) in kept {
+            let step = self.state.steps.get(*number).copied().unwrap_or_default();
             let (game, seen) = (&*self.seats[0], observation_config);
             let metadata = PolicyMetadata {
                 game: game.name().to_owned(),
@@ -296,15 +305,16 @@ impl SelfPlay {
                 seen: None,
                 code: format!("playbot {}", env!("CARGO_PKG_VERSION")),
             };
-            let file = PolicyFile { metadata, policy: policy.clone(), skills: skills.cloned() };
+            let Snapshot { policy, skills } = snapshot.clone();
+            let file = PolicyFile { metadata, policy, skills };
             let obs = Observations::zeros(&file.policy.observation(), 1);
-            file.save(&snapshot_file(folder, *snapshot), &obs, &vec![0.0; file.policy.latent()], 1)?;
+            file.save(&snapshot_file(folder, *number), &obs, &vec![0.0; file.policy.latent()], 1)?;
         }
         Ok(())
     }
 
     /// Goes on from a checkpoint, whose policies were read by [`read_snapshots`]. Returns the rivals of each arena.
-    pub(crate) fn restore(&mut self, mut state: SelfPlayState, snapshots: Vec<(usize, Policy)>) -> Vec<ArenaRivals> {
+    pub(crate) fn restore(&mut self, mut state: SelfPlayState, snapshots: Vec<(usize, Snapshot)>) -> Vec<ArenaRivals> {
         let arenas = std::mem::take(&mut state.arenas);
         (self.state, self.snapshots) = (state, snapshots);
         arenas
@@ -327,10 +337,13 @@ pub(crate) fn read_snapshots(
     config: &SelfPlayConfig,
     state: &SelfPlayState,
     device: DeviceKind,
-) -> Result<Vec<(usize, Policy)>, FileError> {
+) -> Result<Vec<(usize, Snapshot)>, FileError> {
     let all = state.steps.len();
-    let read = |snapshot| Ok((snapshot, PolicyFile::load(&snapshot_file(folder, snapshot), device)?.policy));
-    (0..all).filter(|snapshot| is_kept(*snapshot, all, config, &state.arenas)).map(read).collect()
+    let read = |number| {
+        let PolicyFile { policy, skills, .. } = PolicyFile::load(&snapshot_file(folder, number), device)?;
+        Ok((number, Snapshot { policy, skills }))
+    };
+    (0..all).filter(|number| is_kept(*number, all, config, &state.arenas)).map(read).collect()
 }
 
 /// Returns the number of snapshots that are drawn.

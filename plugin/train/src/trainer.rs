@@ -134,7 +134,7 @@ impl Trainer {
         levels: Option<LevelState>,
     ) -> Result<Self, TrainError> {
         let prior = learner.skills().as_ref().map(SkillPrior::from);
-        let self_play = SelfPlay::new(game, experiment, prior.clone(), threads)?;
+        let self_play = SelfPlay::new(game, experiment, threads)?;
         let opposed = self_play.as_ref().map(|it| it.game_of(0).clone());
         let game: &dyn Game = opposed.as_deref().map_or(game, |it| it);
         let of_experiment = experiment.arrangement(game);
@@ -207,7 +207,7 @@ impl Trainer {
         let start = Instant::now();
         let (policy, latent) = (self.learner.policy(), self.learner.rollout_latent());
         self.renew_skills();
-        self.renew_rivals(&policy);
+        self.renew_rivals();
         let steps = self.experiment.rollout_steps();
         let before = self.learner.times();
         let Collected { rollout, finished, played, alone } = self.collect(&policy, latent, steps)?;

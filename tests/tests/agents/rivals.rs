@@ -1,6 +1,6 @@
 //! Tests of a `Game` whose agents share an arena in teams: four pull at one rope.
 
-use std::{path::Path, sync::Arc};
+use std::{ops::ControlFlow, path::Path, sync::Arc};
 
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -18,9 +18,11 @@ use playbot_harness::{
     },
     worlds::build_world,
 };
-use playbot_learner::DeviceKind;
-use playbot_tests::training::check_resuming;
-use playbot_train::{Trainer, experiment::file::parse_experiment};
+use playbot_learner::{
+    Actions, Dataset, DatasetEpisode, DeviceKind, PolicyFile, Prior, SkillConfig, SkillDraw, SkillModel, SkillTrainer,
+};
+use playbot_tests::training::{check_resuming, run_info};
+use playbot_train::{Trainer, checkpoint::CheckpointChoice, experiment::file::parse_experiment, run_dir::RunDir};
 
 /// Names of the seats. Every other one is of the same team.
 const SEATS: [&str; 4] = ["north", "east", "south", "west"];
@@ -254,4 +256,59 @@ fn self_play_in_teams_goes_on_bit_for_bit_and_learns_to_pull() {
     let rating =
         |name: &str| ladder.members.iter().find(|it| it.name == name).and_then(|it| it.rating).expect(name).elo;
     assert!(rating("step 1,024") > rating("random"), "{ladder:?}");
+}
+
+/// Returns a model of skills that each pull to one side for four ticks.
+fn skills_of_pulling() -> SkillModel {
+    let episode = |number: u32| {
+        let actions: Vec<u32> = (0..32).map(|tick| 1 + (tick / 4 + number * 7 / 3) % 2).collect();
+        let ropes = (0..32).map(|tick| ((tick + number) % 7) as f32 / 7.0 - 0.5);
+        DatasetEpisode { observations: ropes.collect::<Vec<f32>>().into(), actions: Actions::Discrete(actions) }
+    };
+    let dataset = Dataset::new(1, ActionSpace::Discrete(3), (0..16).map(episode).collect()).expect("consistent");
+    let config = SkillConfig {
+        latent: 2,
+        window: 5,
+        hidden: vec![8],
+        encoder_hidden: 8,
+        gru_hidden: 8,
+        gru_layers: 1,
+        batch: 16,
+        ..SkillConfig::default()
+    };
+    let mut trainer = SkillTrainer::new(config, dataset, 1, DeviceKind::Flex).expect("windows fit");
+    trainer.train_epoch(&mut |_| ControlFlow::Continue(())).expect("finite");
+    trainer.into_model()
+}
+
+#[test]
+fn snapshots_of_a_policy_over_skills_keep_their_own_skills_and_go_on_bit_for_bit() {
+    let skills = skills_of_pulling();
+    let trainer = |threads: usize| {
+        let text = r#"(game: "tug", train: "default:0..9", test: "default:10..19", algorithm: "spirl-ppo", steps: 1536,
+            arenas: 8, worlds: 2, demos: "d", skills: (window: 5), score: (horizon: 4),
+            ppo: (num_steps: 32, minibatches: 2, hidden: [8], lr: 0.01, memory: Gru(hidden: 4, sequence: 4)),
+            self_play: (every: Some(256), pool: 2, matches: 2, latest: 0.2))"#;
+        let experiment = parse_experiment(text, Path::new("x.ron")).expect("readable");
+        Trainer::new(&TUG, &experiment, Some(&skills), DeviceKind::Flex, threads).expect("it fits")
+    };
+    check_resuming(&TUG, trainer, 3);
+    let mut trainer = trainer(1);
+    while !trainer.is_done() {
+        trainer.update().expect("it learns");
+    }
+    let newest = trainer.skill_prior().expect("it has skills").prior;
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = RunDir::create(&folder.path().join("run"), trainer.experiment(), &run_info(trainer.experiment()), false);
+    let run = run.expect("fresh");
+    run.save(&mut trainer).expect("writable");
+    let saved = run.checkpoint(CheckpointChoice::Last).expect("saved").path;
+    let drawn = |prior: &Prior| prior.sample(&[0.3, -0.2], 2, SkillDraw::Mean, &mut |_| 0.0).expect("finite");
+    let of_snapshot = |number: usize| {
+        let file = PolicyFile::load(&saved.join(format!("snapshot-{number:04}.policy")), DeviceKind::Flex);
+        drawn(&file.expect("kept").skills.expect("it has skills").prior)
+    };
+    // Six updates, so the seventh snapshot is the newest.
+    assert_eq!(of_snapshot(6), drawn(&newest));
+    assert_ne!(of_snapshot(5), of_snapshot(6), "the policy over skills has learned meanwhile");
 }

@@ -61,9 +61,9 @@ impl Experiment {
             }
             return Ok(());
         };
-        if !self.algorithm.is_trained() || self.algorithm.learns_prior() {
+        if !self.algorithm.is_trained() {
             let why = format!(
-                "{} cannot be trained against rivals: take ppo, score-ppo, sac, score-sac or rlpd, or leave `self_play` out",
+                "{} cannot be trained against rivals, as it plays no game to learn: take another algorithm, or leave `self_play` out",
                 self.algorithm
             );
             return refuse("self_play.every", every, why);
@@ -137,7 +137,7 @@ mod tests {
         assert_eq!(check(r#"algorithm: "ppo", self_play: (every: Some(1000), rivals: ["chaos"])"#), Ok(()));
         for (changes, words) in [
             (r#"algorithm: "ppo", self_play: (pool: 3)"#, "`self_play.every` is None: the other keys"),
-            (r#"algorithm: "spirl-ppo", demos: "d", self_play: (every: Some(1000))"#, "spirl-ppo cannot be trained"),
+            (r#"algorithm: "bc", demos: "d", self_play: (every: Some(1000))"#, "bc cannot be trained"),
             (r#"algorithm: "ppo", observation: Raster, self_play: (every: Some(1000))"#, "rivals see vectors"),
             (r#"algorithm: "ppo", self_play: (every: Some(9))"#, "more than 200 snapshots then: take 50 or more"),
             (

@@ -5,17 +5,16 @@ use crate::{
     collect::{Collector, RestoreError},
     error::TrainError,
     rival_seats::ArenaRivals,
-    self_play::{SelfPlay, SelfPlayState, ladder::Ladder},
+    self_play::{SelfPlay, SelfPlayState, Snapshot, ladder::Ladder},
     trainer::Trainer,
 };
-use playbot_learner::Policy;
 use std::sync::Arc;
 
 impl Trainer {
-    /// Lets the next episodes have the present rivals, `policy` being the first of them.
-    pub(super) fn renew_rivals(&mut self, policy: &Policy) {
+    /// Lets the next episodes have the present rivals, the learner as it is at the start being the first of them.
+    pub(super) fn renew_rivals(&mut self) {
         let Some(self_play) = &mut self.self_play else { return };
-        self_play.begin(policy);
+        self_play.begin(&*self.learner);
         let Some(pool) = self_play.pool().map(Arc::new) else { return };
         self.collectors.iter_mut().filter_map(Collector::rivals_mut).for_each(|rivals| rivals.set_pool(&pool));
     }
@@ -27,7 +26,7 @@ impl Trainer {
         let rivals = self.collectors.iter_mut().filter_map(Collector::rivals_mut);
         let (playing, outcomes): (Vec<_>, Vec<_>) = rivals.map(|it| (it.state(), it.take_outcomes())).unzip();
         self_play.note(outcomes.into_iter().flatten());
-        self_play.after_update([before, step], is_done, &self.learner.policy(), &playing)
+        self_play.after_update([before, step], is_done, &*self.learner, &playing)
     }
 
     /// Returns what decides the rivals of each arena; nothing without rivals.
@@ -76,7 +75,7 @@ impl Trainer {
     pub(crate) fn restore_self_play(
         &mut self,
         state: SelfPlayState,
-        snapshots: Vec<(usize, Policy)>,
+        snapshots: Vec<(usize, Snapshot)>,
     ) -> Result<(), RestoreError> {
         let Some(self_play) = &mut self.self_play else { return Ok(()) };
         let arenas = self_play.restore(state, snapshots);
