@@ -130,16 +130,23 @@ fn settings(experiment: &Experiment, tag: &Tag<'_>) -> Vec<LearningFinding> {
     found
 }
 
+/// Returns the part of a curve before a learning rate that falls to 0 has nearly done so.
+fn before_the_rate_is_0<'a>(experiment: &Experiment, curve: &'a [(u64, f64)]) -> &'a [(u64, f64)] {
+    let until = if experiment.ppo.anneal_lr { experiment.steps - experiment.steps / 10 } else { u64::MAX };
+    &curve[..curve.partition_point(|(step, _)| *step <= until)]
+}
+
 fn steps_of_policy(experiment: &Experiment, tag: &Tag<'_>, is_solved: bool) -> Vec<LearningFinding> {
     let ppo = &experiment.ppo;
     let mut found = Vec::new();
     let learned = tag("approx_kl").len() as u64;
-    let (kl, clip) = (recent(tag("approx_kl"), 3), recent(tag("clip_fraction"), 3));
+    let of = |name: &str| recent(before_the_rate_is_0(experiment, tag(name)), 3);
+    let (kl, clip) = (of("approx_kl"), of("clip_fraction"));
     if let (Some(kl), Some(clip)) = (kl, clip)
         && learned >= ppo.critic_warmup + 3
     {
         let evidence = format!(
-            "in the last 3 updates the KL divergence is {} and {} of the actions are clipped",
+            "in the last 3 updates that were looked at, the KL divergence is {} and {} of the actions are clipped",
             readable(kl),
             readable(clip)
         );
@@ -347,6 +354,9 @@ mod tests {
         let ppo = experiment("ppo", "");
         let still = [("losses/approx_kl", 0.0), ("losses/clip_fraction", 0.0)];
         assert_eq!(signs(&ppo, &still), [Sign::Unmoved]);
+        let falling = Experiment { steps: 10_000, ..experiment("ppo", "ppo: (anneal_lr: true)") };
+        assert_eq!(signs(&falling, &still), [Sign::Unmoved]);
+        assert_eq!(signs(&Experiment { steps: 1000, ..falling }, &still), [], "the rate has fallen to nothing");
         let dead = experiment("ppo", "ppo: (lr: 1.0)");
         assert_eq!(signs(&dead, &still), [Sign::LearningRate], "no advice to raise it");
         let solved = [("losses/approx_kl", 0.0), ("losses/clip_fraction", 0.0), (SUCCESS_RATE, 0.99)];
