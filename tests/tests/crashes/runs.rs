@@ -24,7 +24,7 @@ use super::tree::tree;
 const EVERY: u64 = 2;
 
 const EXPERIMENT: &str = r#"(
-    game: "corridor", train: "plain:0..7", test: "plain:8..15", steps: 192, arenas: 2, worlds: 1, algorithm: "ppo",
+    game: "corridor", train: "plain:0..7", test: "plain:8..15", steps: 320, arenas: 2, worlds: 1, algorithm: "ppo",
     ppo: (num_steps: 8, minibatches: 2, epochs: 1, hidden: [4], lr: 0.003),
     checkpoints: (keep: 2),
 )"#;
@@ -96,7 +96,7 @@ fn a_training_goes_on_to_the_same_bytes_wherever_the_power_failed() {
     let operations = recording.operations();
     let (undisturbed, files) = (written(&run), tree(folder.path()));
     let cuts = distinct_power_cuts(&PaperDisk::default(), &operations);
-    assert!(cuts.len() > 150, "{} states", cuts.len());
+    assert!(cuts.len() > 300, "{} states", cuts.len());
     after_each(&cuts, |cut| {
         let left = tempfile::tempdir().expect("a folder");
         PaperDisk::default().after(&operations, cut).write(folder.path(), left.path());

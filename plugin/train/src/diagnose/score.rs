@@ -4,9 +4,9 @@ use crate::diagnose::{
     advice::Advice,
     evidence::Evidence,
     finding::{LearningFinding, Sign},
-    play::{Played, Seat, mean},
+    play::{Played, Seat},
 };
-use playbot_report::{percent, readable};
+use playbot_report::{percent, readable, statistics::mean_and_sd};
 use std::collections::BTreeMap;
 
 /// Outputs that differ by less do not depend on the observation.
@@ -117,7 +117,8 @@ fn better_without(
     };
     let own = by_level(policy);
     let gains: Vec<f64> = by_level(other).iter().filter_map(|(level, total)| Some(total - own.get(level)?)).collect();
-    let (gain, error) = (mean(gains.iter().copied())?, standard_error(&gains));
+    let (gain, sd) = mean_and_sd(&gains);
+    let error = sd / (gains.len() as f64).sqrt();
     (gains.len() >= FEWEST_LEVELS && gain > CLEAR * error && gain > 0.0).then(|| {
         LearningFinding::new(
             sign,
@@ -132,14 +133,6 @@ fn better_without(
             advice,
         )
     })
-}
-
-/// Returns the standard error of the mean.
-fn standard_error(values: &[f64]) -> f64 {
-    let Some(average) = mean(values.iter().copied()) else { return 0.0 };
-    let squares: f64 = values.iter().map(|value| (value - average).powi(2)).sum();
-    let count = values.len() as f64;
-    (squares / (count * (count - 1.0).max(1.0))).sqrt()
 }
 
 fn decoder(evidence: &Evidence) -> Option<LearningFinding> {
