@@ -25,11 +25,13 @@ const TINY: &str = r#"(
         (name: "chosen", set: ["algorithm=spirl-ppo"]),
         (name: "recorded", set: ["algorithm=rlpd"]),
         (name: "cloned", set: ["algorithm=bc"]),
+        (name: "imitated", set: ["algorithm=imitation"]),
+        (name: "asked", set: ["algorithm=imitation", "imitation.dagger=true"]),
     ],
     skills: (window: 5, epochs: 1, batch: 16, hidden: [16, 16], encoder_hidden: 8, gru_hidden: 8, latent: 2),
     ppo: (num_steps: 16, minibatches: 2, hidden: [16, 16]),
     sac: (num_steps: 16, learning_starts: 500, updates_per_step: 0.02, batch: 16, hidden: [16, 16]),
-    rlpd: (critics: 3),
+    rlpd: (critics: 3), imitation: (rounds: 2, steps: 128),
     eval: (episodes_per_level: 1),
     checkpoints: (every: 2),
 )"#;
@@ -73,7 +75,7 @@ fn a_killed_study_goes_on_to_the_same_files_and_repeats_nothing() {
     let whole = ok(study(folder, "whole", &[]));
     let expected = written(folder);
     let table = said(&whole);
-    assert_eq!(table.lines().count(), 8, "headings, rule and six variants: {table}");
+    assert_eq!(table.lines().count(), 10, "headings, rule and eight variants: {table}");
     assert!(
         expected[0].contains(table.trim()) && expected[0].contains("playbot study --experiment tiny.ron --out out")
     );
@@ -90,10 +92,12 @@ fn a_killed_study_goes_on_to_the_same_files_and_repeats_nothing() {
     let results: Value = serde_json::from_str(&expected[2]).expect("JSON");
     let rows = results["results"].as_array().expect("rows");
     let names: Vec<_> = rows.iter().filter_map(|row| Some((row["variant"].as_str()?, row["seed"].as_u64()?))).collect();
-    let all = ["full", "no-kl", "plain", "chosen", "recorded", "cloned"].map(|name| [(name, 1), (name, 2)]);
+    let all = ["full", "no-kl", "plain", "chosen", "recorded", "cloned", "imitated", "asked"]
+        .map(|name| [(name, 1), (name, 2)]);
     assert_eq!(names, all.concat());
     assert!(rows.iter().all(|row| row["test"]["episodes"] == 2));
     assert!(rows[..10].iter().all(|row| row["training"]["steps"] == 1024) && rows[10]["training"].is_null());
+    assert_eq!(rows[14]["training"]["steps"], 256, "two rounds of 128 labels");
     let models = fs::read_dir(folder.join("whole")).expect("there").flatten();
     let models = models.filter(|entry| entry.file_name().to_string_lossy().starts_with("skills-")).count();
     assert_eq!(models, 2, "one for each seed, shared by the variants");
@@ -105,7 +109,7 @@ fn a_killed_study_goes_on_to_the_same_files_and_repeats_nothing() {
     let args = ["study", "--experiment", "tiny.ron", "--out", "out", "--runs", "killed"];
     let mut child = command(folder, &args).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().expect("starts");
     let mut said = BufReader::new(child.stderr.take().expect("piped")).lines().map_while(Result::ok);
-    assert!(said.any(|line| line.starts_with("full-seed2: ")), "two runs of twelve are done");
+    assert!(said.any(|line| line.starts_with("full-seed2: ")), "two runs of sixteen are done");
     let begun = Instant::now();
     while !folder.join("killed/no-kl-seed1/checkpoints").exists() && begun.elapsed() < Duration::from_secs(60) {
         std::thread::yield_now();

@@ -76,6 +76,14 @@ impl ObsStats {
         out
     }
 
+    /// Adds 1 to the count of each value that normalisation clips.
+    pub(crate) fn count_clipped(&self, observation: &[f32], counts: &mut [usize]) {
+        let dims = observation.iter().zip(&self.mean).zip(&self.inv_std);
+        for (count, ((&x, m), s)) in counts.iter_mut().zip(dims) {
+            *count += usize::from(((f64::from(x) - m) * s).abs() > CLIP);
+        }
+    }
+
     /// Writes the normalised `observation` to `out`, which is as long: clip((x - mean) / deviation, ±10).
     pub fn normalize_into(&self, observation: &[f32], out: &mut [f32]) {
         let dims = observation.iter().zip(&self.mean).zip(&self.inv_std);

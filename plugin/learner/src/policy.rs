@@ -103,6 +103,18 @@ impl Policy {
         self.stats.is_some()
     }
 
+    /// Returns the share of the observations in which each value lies beyond the bound of the normaliser, ten deviations
+    /// from the mean, from 0 to 1. `None` if observations are not normalised, or there are none of the right length.
+    pub fn clipped_shares<'a>(&self, observations: impl Iterator<Item = &'a [f32]>) -> Option<Vec<f64>> {
+        let stats = self.stats.as_ref()?;
+        let (mut counts, mut rows) = (vec![0; self.obs_dim()], 0_u64);
+        for row in observations.filter(|row| row.len() == counts.len()).collect::<Vec<_>>() {
+            stats.count_clipped(row, &mut counts);
+            rows += 1;
+        }
+        (rows > 0).then(|| counts.into_iter().map(|count| count as f64 / rows as f64).collect())
+    }
+
     /// Returns whether it computes on the CPU.
     pub fn is_on_host(&self) -> bool {
         is_host(&self.device)

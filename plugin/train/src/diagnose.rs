@@ -30,7 +30,7 @@ mod score;
 #[cfg(test)]
 mod testing;
 
-use crate::{experiment::Experiment, metrics_log::UpdateReport, runs::RunCurves};
+use crate::{experiment::Experiment, metrics_log::UpdateReport, runs::RunCurves, train_run::never_learns};
 use std::path::Path;
 
 pub use crate::diagnose::{
@@ -65,7 +65,7 @@ pub fn diagnose(evidence: &Evidence) -> Diagnosis {
 /// The metrics cannot be read.
 pub fn of_metrics(experiment: &Experiment, run: &Path) -> Result<Diagnosis, DiagnoseError> {
     let curves = RunCurves::read(run)?;
-    let context = AdviceContext { run: Some(run.display().to_string()), ..Evidence::new(experiment, 0).context };
+    let context = AdviceContext { run: Some(run.display().to_string()), ..AdviceContext::new(experiment) };
     Ok(Diagnosis::new(metrics::check(experiment, &curves), Vec::new(), context))
 }
 
@@ -93,15 +93,16 @@ fn of_game_itself(evidence: &Evidence) -> Vec<LearningFinding> {
 /// The first warning of a training, from its settings and metrics alone.
 #[derive(Clone, Debug)]
 pub struct FirstWarning {
-    experiment: Experiment,
+    context: AdviceContext,
     curves: RunCurves,
     is_given: bool,
 }
 
 impl FirstWarning {
-    /// Begins to look at a training.
-    pub fn new(experiment: &Experiment) -> Self {
-        Self { experiment: experiment.clone(), curves: RunCurves::default(), is_given: false }
+    /// Begins to look at a training in the folder of a run.
+    pub fn new(experiment: &Experiment, run: &Path) -> Self {
+        let context = AdviceContext { run: Some(run.display().to_string()), ..AdviceContext::new(experiment) };
+        Self { context, curves: RunCurves::default(), is_given: false }
     }
 
     /// Adds the metrics of an update. Returns the most likely cause once something is found, and nothing after that.
@@ -111,14 +112,14 @@ impl FirstWarning {
 
     fn add(&mut self, step: u64, scalars: Vec<(&'static str, f64)>) -> Option<String> {
         self.curves.push(step, scalars.into_iter());
-        let found = metrics::check(&self.experiment, &self.curves);
-        if found.is_empty() {
-            // Most updates: what advice needs is put together for a finding alone.
-            return None;
-        }
+        let mut found = metrics::check(&self.context.experiment, &self.curves);
+        // A training says by itself that it never begins to learn, and at its end in which lesson it was.
+        let told = never_learns(&self.context.experiment);
+        found.retain(|finding| finding.sign != Sign::LessonNotLearned && told.as_ref() != Some(&finding.evidence));
+        found.sort_by_key(|finding| finding.sign);
+        let first = found.first()?;
         self.is_given = true;
-        let diagnosis = Diagnosis::new(found, Vec::new(), Evidence::new(&self.experiment, 0).context);
-        diagnosis.findings.first().map(|first| first.warning(&diagnosis.context))
+        Some(first.warning(&self.context))
     }
 }
 
@@ -146,13 +147,13 @@ mod tests {
     #[test]
     fn a_training_is_warned_once() {
         let experiment = evidence("ppo", "ppo: (lr: 1.0)").experiment;
-        let mut watch = FirstWarning::new(&experiment);
+        let mut watch = FirstWarning::new(&experiment, Path::new("runs/a"));
         let metrics = || vec![("losses/approx_kl", 0.01)];
         let words = watch.add(100, metrics()).expect("the rate is too high");
         assert!(words.starts_with("the learning rate is too high: `ppo.lr` is 1"), "{words}");
-        assert!(words.contains("--set ppo.lr=0.0003"), "{words}");
+        assert!(words.contains("--experiment runs/a/experiment.ron --run runs/a-next --set ppo.lr=0.0003"), "{words}");
         assert!(watch.is_given, "a second update is not looked at");
         let healthy = evidence("ppo", "").experiment;
-        assert_eq!(FirstWarning::new(&healthy).add(100, metrics()), None);
+        assert_eq!(FirstWarning::new(&healthy, Path::new("runs/a")).add(100, metrics()), None);
     }
 }

@@ -195,6 +195,12 @@ pub struct Variant {
 }
 
 impl Experiment {
+    /// Returns whether its run needs recordings: for skills, for its own training, or to imitate them.
+    pub fn learns_from_demos(&self) -> bool {
+        let imitates = self.algorithm == Algorithm::Imitation && !self.imitation.dagger;
+        imitates || self.algorithm.learns_from_demos()
+    }
+
     /// Returns the kind of observations with their settings.
     pub fn observation_config(&self) -> ObservationConfig {
         ObservationConfig { kind: self.observation, image: self.image }

@@ -6,7 +6,7 @@
 //! that was visited. The policy learns from all states of all rounds. The demonstrator takes a falling share of the
 //! actions ([`ImitationConfig::beta`](playbot_learner::ImitationConfig)).
 //!
-//! After each round the policy is measured on training levels that are never labelled. Checkpoints hold the best policy so
+//! After each round the policy is measured on training levels on which nobody is asked. Checkpoints hold the best policy so
 //! far, for everything that reads runs, and the present one, for the resumption.
 //!
 //! ```text
@@ -30,7 +30,7 @@ use crate::{
     imitate::asked::{AskPlan, Asked, ask},
     metrics_log::{Timing, UpdateReport},
     recordings::{RecordingsError, find_recordings, read_dataset},
-    run_dir::{OpenedRun, RunDir, RunError, check_new},
+    run_dir::{OpenedRun, RunDir, RunError, RunLock, check_new},
     run_observer::{CountedWork, RunEvent, RunObserver},
     train_run::{NewRun, TrainingSetup, run_info},
     trainer,
@@ -44,8 +44,8 @@ use playbot_harness::{
     split::LevelSplit,
 };
 use playbot_learner::{
-    FileError, HasExitCode, LabelledSteps, LearnError, Learner, Policy, PolicySpec, PpoLearner, Streams, disk,
-    rng::unit,
+    DeviceKind, FileError, HasExitCode, LabelledSteps, LearnError, Learner, Policy, PolicySpec, PpoLearner, Streams,
+    disk, rng::unit,
 };
 use serde::{Deserialize, Serialize};
 use std::{fs, path::PathBuf, time::Instant};
@@ -236,7 +236,19 @@ impl<'a> Imitation<'a> {
         observer: &mut dyn RunObserver,
     ) -> Result<Self, ImitateError> {
         check_new(new.path, new.force)?;
-        let mut experiment = Experiment { algorithm: Algorithm::Imitation, ..new.experiment.without_study() };
+        let lock = || RunLock::of_new(new.path, new.force);
+        Self::begin_with(game, &new.experiment.without_study(), &lock, setup, observer)
+    }
+
+    /// Begins an imitation as [`begin`](Self::begin) does, in the folder that `lock` gives.
+    pub(crate) fn begin_with(
+        game: &'a dyn Game,
+        experiment: &Experiment,
+        lock: &dyn Fn() -> Result<RunLock, RunError>,
+        setup: &TrainingSetup<'_>,
+        observer: &mut dyn RunObserver,
+    ) -> Result<Self, ImitateError> {
+        let mut experiment = Experiment { algorithm: Algorithm::Imitation, ..experiment.clone() };
         trainer::check(game, &experiment)?;
         let spec = spec_of(game, &experiment);
         let (mut steps, mut seen) = (LabelledSteps::empty(&spec), None);
@@ -251,9 +263,17 @@ impl<'a> Imitation<'a> {
             experiment.steps = (steps.len() as u64).saturating_mul(experiment.imitation.rounds).max(1);
         }
         let learner = PpoLearner::new(experiment.with_sets(game).ppo_config(), spec, experiment.seed, setup.device)?;
-        let new = NewRun { experiment: &experiment, from: None, ..*new };
+        let lock = lock()?;
+        let new = NewRun {
+            path: lock.folder(),
+            experiment: &experiment,
+            skills: None,
+            skill_file: None,
+            from: None,
+            force: true,
+        };
         let info = run_info(game, &new, seen, setup)?;
-        let run = RunDir::create(new.path, &experiment, &info, new.force)?;
+        let run = RunDir::begin(lock, &experiment, &info)?;
         let imitation = Self {
             game,
             levels: ImitationLevels::of(&experiment),
@@ -333,6 +353,19 @@ impl<'a> Imitation<'a> {
     /// Returns the present policy.
     pub fn policy(&self) -> Policy {
         self.learner.policy()
+    }
+
+    /// Returns the folder of the run, and the policy of the best round so far: the present one before the first round.
+    ///
+    /// # Errors
+    ///
+    /// [`ImitateError::File`] if that cannot be read.
+    pub(crate) fn into_best(self, device: DeviceKind) -> Result<(RunDir, Policy), ImitateError> {
+        let policy = match self.run.checkpoint(CheckpointChoice::Last) {
+            Ok(last) => PpoLearner::load(&last.learner_file(), device)?.policy(),
+            Err(_) => self.learner.policy(),
+        };
+        Ok((self.run, policy))
     }
 
     /// Returns whether all rounds are done, or the last ones were no better than one before.

@@ -10,7 +10,8 @@ mod side_by_side;
 use crate::{
     checkpoint::CheckpointChoice,
     error::TrainError,
-    experiment::{EvalConfig, Experiment, ExperimentError},
+    experiment::{Algorithm, EvalConfig, Experiment, ExperimentError},
+    imitate::{ImitateError, Imitation},
     learn_skills,
     learn_skills::{LearnSkillsError, behaviour_cloning},
     metrics_log::{EPISODIC_RETURN, SUCCESS_RATE},
@@ -36,6 +37,7 @@ use playbot_harness::{
 use playbot_learner::{Dataset, FileError, HasExitCode, SeenLevels, SkillModel, disk};
 use playbot_report::statistics::steps_to_reach;
 use std::{
+    cell::Cell,
     collections::BTreeSet,
     path::{Path, PathBuf},
     sync::Mutex,
@@ -98,6 +100,9 @@ pub enum StudyRunError {
     /// A skill model cannot be read or written.
     #[error(transparent)]
     Model(#[from] FileError),
+    /// The imitation fails.
+    #[error(transparent)]
+    Imitate(Box<ImitateError>),
     /// The training fails.
     #[error(transparent)]
     Training(#[from] TrainingError),
@@ -124,6 +129,12 @@ impl From<LearnSkillsError> for StudyRunError {
     }
 }
 
+impl From<ImitateError> for StudyRunError {
+    fn from(error: ImitateError) -> Self {
+        Self::Imitate(error.into())
+    }
+}
+
 impl From<RunError> for StudyRunError {
     fn from(error: RunError) -> Self {
         Self::Run(error.into())
@@ -139,6 +150,7 @@ impl HasExitCode for StudyRunError {
             Self::Recordings(error) => error.exit_code(),
             Self::Skills(error) => error.exit_code(),
             Self::Model(error) => error.exit_code(),
+            Self::Imitate(error) => error.exit_code(),
             Self::Training(error) => error.exit_code(),
             Self::Run(error) => error.exit_code(),
             Self::Metrics(error) => error.exit_code(),
@@ -313,7 +325,7 @@ impl<'a> StudyRunner<'a> {
         observer: &mut dyn RunObserver,
     ) -> Result<SeenLevels, StudyRunError> {
         let (experiment, folder) = (&run.experiment, self.folder.join(run.id()));
-        let trained = || match experiment.algorithm.is_trained() {
+        let trained = || match experiment.algorithm.has_checkpoints() {
             true => experiment.seen_by_training(game),
             false => SeenLevels { game: game.name().to_owned(), ..SeenLevels::default() },
         };
@@ -323,7 +335,7 @@ impl<'a> StudyRunner<'a> {
             return Ok(info.seen.unwrap_or_else(trained));
         }
         let mut seen = trained();
-        if experiment.algorithm.learns_from_demos() {
+        if experiment.learns_from_demos() {
             seen.extend(&self.recorded(game, run, observer)?);
         }
         Ok(seen)
@@ -434,9 +446,10 @@ impl<'a> StudyRunner<'a> {
     /// Returns whether a run has yet to learn from recordings.
     fn wants_recordings(&self, run: &StudyRun) -> Result<bool, StudyRunError> {
         let algorithm = run.experiment.algorithm;
+        let learns = run.experiment.learns_from_demos();
         let is_measured = !self.force && self.folder.join(run.id()).join(RESULT).exists();
         let has_skills = algorithm.needs_skills() && !self.force && self.skill_file(run)?.exists();
-        Ok(algorithm.learns_from_demos() && !is_measured && !has_skills)
+        Ok(learns && !is_measured && !has_skills)
     }
 
     /// Checks recordings, unless they were checked already.
@@ -501,9 +514,10 @@ impl<'a> StudyRunner<'a> {
             return Ok(None);
         }
         let OpenedRun { experiment: saved, info, .. } = RunDir::open(folder)?;
-        // The levels of a measurement are none of training.
+        // The levels of a measurement are none of training, and an imitation counts its own steps.
         let eval = EvalConfig { include_seen: saved.eval.include_seen, ..run.experiment.eval.clone() };
-        if saved == (Experiment { eval, ..run.experiment.clone() }) {
+        let steps = if run.experiment.algorithm == Algorithm::Imitation { saved.steps } else { run.experiment.steps };
+        if saved == (Experiment { eval, steps, ..run.experiment.clone() }) {
             return Ok(Some(info));
         }
         let (wanted, saved) = (Box::new(run.experiment.clone()), Box::new(saved));
@@ -548,6 +562,9 @@ impl<'a> StudyRunner<'a> {
     ) -> Result<Option<TrainedRun>, StudyRunError> {
         let (experiment, setup) = (&run.experiment, TrainingSetup { threads, ..self.setup });
         let draw = if experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
+        if experiment.algorithm == Algorithm::Imitation {
+            return self.imitate(game, run, run_folder, threads, observer);
+        }
         let begun = matches!(&run_folder, RunFolder::Begun(dir) if dir.checkpoint(CheckpointChoice::Last).is_ok());
         let skills = match experiment.algorithm.needs_skills() && !begun {
             true => match self.skills(game, run, threads, observer)? {
@@ -580,6 +597,39 @@ impl<'a> StudyRunner<'a> {
         let Training { run: dir, trainer, .. } = training;
         let player = Player::Policy { policy: trainer.policy(), prior: trainer.skill_prior(), draw };
         let training = Some(training_result(dir.path(), experiment, trainer.steps())?);
+        let curves = learning_curves(dir.path())?;
+        Ok(Some(TrainedRun { dir, player, training, curves }))
+    }
+
+    /// Imitates recordings or a demonstrator, without reward: the policy of the best round is the run's.
+    fn imitate(
+        &self,
+        game: &dyn Game,
+        run: &StudyRun,
+        run_folder: RunFolder,
+        threads: usize,
+        observer: &mut dyn RunObserver,
+    ) -> Result<Option<TrainedRun>, StudyRunError> {
+        let (experiment, setup) = (&run.experiment, TrainingSetup { threads, ..self.setup });
+        let mut imitation = match run_folder {
+            RunFolder::Begun(dir) => {
+                let OpenedRun { experiment, info, .. } = RunDir::open(dir.path())?;
+                Imitation::resume(game, OpenedRun { run: dir, experiment, info }, &setup)?
+            }
+            RunFolder::New(lock) => {
+                let lock = Cell::new(Some(lock));
+                let taken = || lock.take().map_or_else(|| RunLock::of_new(&self.folder.join(run.id()), true), Ok);
+                Imitation::begin_with(game, experiment, &taken, &setup, observer)?
+            }
+        };
+        if !imitation.drive(observer, &mut |_, _| {})? {
+            return Ok(None);
+        }
+        let steps = imitation.progress().steps;
+        let (dir, policy) = imitation.into_best(setup.device)?;
+        let draw = if experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
+        let player = Player::Policy { policy, prior: None, draw };
+        let training = Some(training_result(dir.path(), experiment, steps)?);
         let curves = learning_curves(dir.path())?;
         Ok(Some(TrainedRun { dir, player, training, curves }))
     }

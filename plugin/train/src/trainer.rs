@@ -405,6 +405,12 @@ impl Trainer {
         self.seen.iter_mut().for_each(|seen| seen.extend(recorded));
     }
 
+    /// Returns the present lesson and the number of all, of which that of `train` is the last; `None` without a curriculum.
+    pub fn lesson(&self) -> Option<(usize, usize)> {
+        let (lesson, all) = self.plan.lesson();
+        (all > 1).then_some((lesson + 1, all))
+    }
+
     /// Returns a copy of the present policy.
     pub fn policy(&self) -> Policy {
         self.learner.policy()

@@ -11,6 +11,7 @@ use bevy_playbot::{demo::file::DemoReader, engine::find_demos};
 use playbot_harness::{
     game::Game,
     games::{Artifact, Games},
+    sealed_file::file_checksum,
 };
 use playbot_learner::SkillModel;
 use playbot_report::Report;
@@ -104,6 +105,7 @@ fn gather(args: &Args, games: &Games) -> Result<Evidence, CliError> {
         if args.replays {
             check_plays(game, &opened.experiment)?;
         }
+        check_skills(args, path, opened.info.skills.as_deref())?;
         let skills = skills(args)?;
         return of_run(game, path, skills.as_ref(), &gathering).map_err(explain);
     }
@@ -116,6 +118,7 @@ fn gather(args: &Args, games: &Games) -> Result<Evidence, CliError> {
         if !args.from.names_game() {
             // They are compared with levels that somebody has named, and not with a default.
             evidence.other_modes.clear();
+            evidence.held_out_recorded = 0;
         }
         return Ok(evidence);
     }
@@ -139,6 +142,17 @@ fn check_plays(game: &dyn Game, experiment: &Experiment) -> Result<(), CliError>
     check_start(game, &experiment.train.mode, experiment.train.first)
 }
 
+/// Refuses skills that are not those of the run, which would say nothing of it.
+fn check_skills(args: &Args, run: &Path, own: Option<&str>) -> Result<(), CliError> {
+    let Some(file) = &args.skills else { return Ok(()) };
+    let why = match own {
+        Some(own) if file_checksum(file)? != own => "the run was trained with the skills of another file",
+        Some(_) => return Ok(()),
+        None => "the run has no skills",
+    };
+    Err(CliError::Usage(format!("{} is no evidence of {}: {why}; leave out --skills", file.display(), run.display())))
+}
+
 fn skills(args: &Args) -> Result<Option<SkillModel>, CliError> {
     args.skills.as_deref().map(|path| open::skills(path, args.compute.device(), &args.from)).transpose()
 }
@@ -149,11 +163,26 @@ fn of_demos<'a>(args: &Args, games: &Games<'a>) -> Result<(&'a dyn Game, Experim
         let experiment = args.from.load(games, [])?;
         return Ok((args.from.find_game(games, &experiment)?, args.from.clone()));
     }
-    let path = &args.demo[0];
-    let files = find_demos(path).map_err(open::missing_recording)?;
-    let file = files.first().unwrap_or(path);
-    let reader = DemoReader::open(file).map_err(open::missing_recording)?;
-    let game = games.of_file(Artifact::Recording, file, &reader.header().game)?;
+    let mut first: Option<(PathBuf, String)> = None;
+    for path in &args.demo {
+        for file in find_demos(path).map_err(open::missing_recording)? {
+            let game = DemoReader::open(&file).map_err(open::missing_recording)?.header().game.clone();
+            match &first {
+                Some((other, known)) if *known != game => {
+                    return Err(CliError::Usage(format!(
+                        "{} is of {known}, and {} is of {game}: name recordings of one game, or the game that they should \
+                         be of",
+                        other.display(),
+                        file.display()
+                    )));
+                }
+                Some(_) => {}
+                None => first = Some((file, game)),
+            }
+        }
+    }
+    let (file, game) = first.unwrap_or_else(|| (args.demo[0].clone(), String::new()));
+    let game = games.of_file(Artifact::Recording, &file, &game)?;
     Ok((game, ExperimentArgs { set: args.from.set.clone(), ..ExperimentArgs::of_game(game.name()) }))
 }
 
@@ -168,9 +197,10 @@ fn write_page(out: &Path, args: &Args, diagnosis: &Diagnosis) -> Result<(), CliE
     let subject = match (&args.run, args.demo.first()) {
         (Some(run), _) => run.display().to_string(),
         (None, Some(demo)) => demo.display().to_string(),
-        (None, None) => diagnosis.context.game.clone(),
+        (None, None) => diagnosis.context.experiment.game.clone(),
     };
-    let subtitle = format!("{} on {}", diagnosis.context.algorithm, diagnosis.context.train);
+    let Experiment { algorithm, train, .. } = &diagnosis.context.experiment;
+    let subtitle = format!("{algorithm} on {train}");
     let ladder = args.run.as_deref().map(Ladder::read).transpose()?.flatten();
     let sections = [diagnosis.section()].into_iter().chain(ladder.map(|ladder| ladder.section())).collect();
     let report = Report { title: format!("Diagnosis of {subject}"), subtitle, sections };
@@ -183,9 +213,11 @@ fn write_page(out: &Path, args: &Args, diagnosis: &Diagnosis) -> Result<(), CliE
 mod tests {
     use crate::command_line::check_usage;
     use playbot_train::{
-        Algorithm,
+        Algorithm, Experiment,
         diagnose::{Advice, AdviceContext},
+        experiment::file::parse_experiment,
     };
+    use std::path::Path;
 
     /// Splits the command as a shell does: single quotes keep blanks.
     fn words(command: &str) -> Vec<String> {
@@ -203,19 +235,14 @@ mod tests {
 
     #[test]
     fn every_command_that_is_advised_can_be_parsed() {
+        let text = r#"(game: "coinrun", train: "hard:0..63", test: "hard:64..127", demos: "d", steps: 1000)"#;
+        let experiment = parse_experiment(text, Path::new("x.ron")).expect("valid");
         let mut commands = 0;
         for algorithm in Algorithm::TRAINED {
             for (run, demos) in [(None, None), (Some("runs/a b"), Some("my demos"))] {
                 let own = |path: Option<&str>| path.map(str::to_owned);
-                let (mode, train) = ("hard".to_owned(), "hard:0..63".to_owned());
-                let context = AdviceContext {
-                    game: "coinrun".to_owned(),
-                    mode,
-                    train,
-                    algorithm,
-                    run: own(run),
-                    demos: own(demos),
-                };
+                let experiment = Experiment { algorithm, ..experiment.clone() };
+                let context = AdviceContext { run: own(run), demos: own(demos), ..AdviceContext::new(&experiment) };
                 for command in Advice::ALL.into_iter().filter_map(|advice| advice.command(&context)) {
                     check_usage(words(&command)).unwrap_or_else(|error| panic!("{command}\n{error}"));
                     commands += 1;

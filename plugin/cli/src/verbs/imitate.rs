@@ -3,7 +3,7 @@
 use crate::{
     arguments::{
         Compute, check_start,
-        experiment::{ExperimentArgs, in_words, option},
+        experiment::{ExperimentArgs, in_words, option, sets_key},
         revision,
     },
     error::{CliError, Outcome},
@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 /// from all states of all rounds, and the share of the demonstrator's own actions falls from round to round. Without
 /// --dagger the policy learns from recordings alone.
 ///
-/// After each round the policy is measured on the last training levels, which are never labelled. Imitation ends after
+/// After each round the policy is measured on the last training levels, on which the demonstrator is never asked; recordings may show them. Imitation ends after
 /// some rounds without a better result. The run holds the best policy: `eval`, `test` and `policy` take it, and
 /// `train --algorithm ppo --from RUN` trains it further.
 #[derive(clap::Args)]
@@ -85,7 +85,10 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     }
     let levels = imitation.levels();
     match &levels.held_out {
-        Some(held_out) => report!("imitating on {}, and measuring rounds on {held_out}", levels.labelled),
+        Some(held_out) if imitation.experiment().imitation.dagger => {
+            report!("imitating on {}, and measuring rounds on {held_out}", levels.labelled);
+        }
+        Some(held_out) => report!("imitating recordings, and measuring rounds on {held_out}, which they may show"),
         None => report!("imitating on {}; no level is left to measure rounds on", levels.labelled),
     }
     interrupt::go_on_with(format!("`{program} imitate --run {path} --resume`"));
@@ -138,8 +141,9 @@ fn begin<'a>(
             "nothing to imitate: name recordings with --demos, or ask the game's demonstrator with --dagger".to_owned(),
         ));
     }
-    if args.steps.is_some() && !experiment.imitation.dagger {
-        report!("warning: --steps changes nothing without --dagger: recordings are learned from as a whole");
+    let sets_steps = args.steps.is_some() || args.from.set.iter().any(|set| sets_key(set, "imitation.steps"));
+    if sets_steps && !experiment.imitation.dagger {
+        report!("warning: `imitation.steps` changes nothing without --dagger: recordings are learned from as a whole");
     }
     check_start(game, &experiment.train.mode, experiment.train.first)?;
     interrupt::leave("nothing is learned yet".to_owned());

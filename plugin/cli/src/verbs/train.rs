@@ -125,7 +125,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         report_length(training.trainer.experiment());
     }
     interrupt::go_on_with(format!("`{program} train --run {path} --resume`"));
-    let mut warning = FirstWarning::new(training.trainer.experiment());
+    let mut warning = FirstWarning::new(training.trainer.experiment(), &args.run);
     let mut console = console.on_update(|report| {
         if let Some(words) = warning.note(report) {
             let words = program::named(&words);
@@ -133,6 +133,12 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         }
     });
     if training.drive(&mut console)? {
+        if let Some((lesson, of)) = training.trainer.lesson().filter(|(lesson, of)| lesson < of) {
+            report!(
+                "warning: the training ended in lesson {lesson} of {of}, before that of `train`: train for longer with \
+                 `{program} train --run {path} --resume --steps N`, or give the lesson a smaller `success`"
+            );
+        }
         report!("done: test it with `{program} eval --run {path}`");
         return Ok(Outcome::Pass);
     }
@@ -248,12 +254,14 @@ fn equal_layouts(game: &dyn Game, train: &LevelSplit, test: &LevelSplit, seen: O
     let of_held_out = |count: usize| format!("{count} of the {} held-out levels {test} have", whole(test.len() as f64));
     let held_out = match (equal.groups.is_empty(), known) {
         _ if seen.max(known) == 0 => None,
-        (_, 0) => Some(format!("{} the layout of a recorded level", of_held_out(seen))),
+        (_, 0) => Some(format!("{} the layout of a level of a recording or lesson", of_held_out(seen))),
         (true, _) if seen > known => {
-            Some(format!("{} the layout of a training level or of a recorded one", of_held_out(seen)))
+            Some(format!("{} the layout of a training level, or of one of a recording or lesson", of_held_out(seen)))
         }
         (true, known) => Some(format!("{} the layout of a training level", of_held_out(known))),
-        (false, _) if seen > known => Some(format!("{} one of these or that of a recorded level", of_held_out(seen))),
+        (false, _) if seen > known => {
+            Some(format!("{} one of these, or that of a level of a recording or lesson", of_held_out(seen)))
+        }
         (false, known) => Some(format!("{} one of these", of_held_out(known))),
     };
     match (equal.groups.is_empty(), held_out) {
@@ -409,15 +417,18 @@ mod tests {
         assert_eq!(words(&game(1000), train, &["default:0..3", "default:20..30"]), None);
         assert_eq!(
             words(&game(50), "default:10..13", &["default:10..13", "default:2..3"]),
-            Some(format!("2 of the {test} have the layout of a recorded level"))
+            Some(format!("2 of the {test} have the layout of a level of a recording or lesson"))
         );
         assert_eq!(
             words(&game(50), train, &[train, "default:58..59"]),
-            Some(format!("6 of the {test} have the layout of a training level or of a recorded one"))
+            Some(format!("6 of the {test} have the layout of a training level, or of one of a recording or lesson"))
         );
         let twice = words(&game(50), "default:0..50", &["default:0..50", "default:1000..1002"]);
         assert!(twice.as_ref().is_some_and(|words| words.ends_with(&format!("10 of the {test} have one of these"))));
         let some = words(&game(4).layout(|_, level| level.max(2) % 109), "default:0..2", &["default:108..108"]);
-        assert!(some.as_ref().is_some_and(|words| words.ends_with("have the layout of a recorded level")), "{some:?}");
+        assert!(
+            some.as_ref().is_some_and(|words| words.ends_with("have the layout of a level of a recording or lesson")),
+            "{some:?}"
+        );
     }
 }

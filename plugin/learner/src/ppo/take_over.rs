@@ -61,7 +61,7 @@ impl PpoLearner {
         if report.taken.is_empty() {
             return Err(LearnError::Config(format!(
                 "no layer of its policy fits: its hidden layers are {:?}, and those of the new run {:?}; give both the same, \
-                 with --set ppo.hidden={:?}, or at least the same first one",
+                 with --set 'ppo.hidden={:?}', or at least the same first one",
                 their_shape.net.hidden, shape.net.hidden, their_shape.net.hidden
             )));
         }

@@ -8,7 +8,7 @@ use crate::diagnose::{
     play::{PlayedEpisode, Seat},
     recordings::RecordedSet,
 };
-use bevy_playbot::action::ActionValue;
+use bevy_playbot::action::{ActionSpace, ActionValue};
 use playbot_report::{percent, whole};
 
 /// Share of the recorded ticks from which on an action is needed.
@@ -31,13 +31,20 @@ pub fn check(evidence: &Evidence) -> Vec<LearningFinding> {
     found
 }
 
-/// Returns the share of recorded or demonstrated ticks with a discrete action.
+/// Returns whether an action is the one of this number, or has the option in this place among those of all choices.
+fn takes(space: ActionSpace, taken: &ActionValue, number: u32) -> bool {
+    let choices = space.choices();
+    let mut options = choices.ranges().zip(taken.options());
+    options.any(|(range, option)| range.start + *option as usize == number as usize)
+}
+
+/// Returns the share of recorded or demonstrated ticks with an action of this number.
 fn demonstrated(evidence: &Evidence, action: u32) -> Option<f64> {
     let recorded = evidence.recordings.as_ref().filter(|set| !set.episodes.is_empty());
-    let recorded = recorded.map(|set: &RecordedSet| set.share_of(action));
+    let recorded = recorded.map(|set: &RecordedSet| set.share_of(|taken| takes(evidence.action_space, taken, action)));
     let live = evidence.played(Seat::Demonstrator).map(|played| {
         let actions = || played.episodes.iter().flat_map(|episode| &episode.actions);
-        let taken = actions().filter(|taken| **taken == ActionValue::Discrete(action)).count();
+        let taken = actions().filter(|taken| takes(evidence.action_space, taken, action)).count();
         taken as f64 / actions().count().max(1) as f64
     });
     match (recorded, live) {
@@ -94,13 +101,11 @@ fn dead(evidence: &Evidence) -> Option<LearningFinding> {
     let least = needed_share(evidence);
     let dead: Vec<&ForcedAction> = evidence.forced.iter().filter(|action| action.is_dead()).collect();
     let tried = evidence.forced.iter().filter(|action| action.tried > 0).count();
-    let is_continuous = matches!(
-        evidence.played.iter().flat_map(|played| &played.episodes).flat_map(|episode| &episode.actions).next(),
-        Some(ActionValue::Continuous(_))
-    );
+    // Every number is needed.
+    let is_number = |action: &ForcedAction| action.number as usize >= evidence.action_space.options();
     let needed: Vec<&&ForcedAction> = dead
         .iter()
-        .filter(|action| is_continuous || demonstrated(evidence, action.number).is_some_and(|share| share >= least))
+        .filter(|action| is_number(action) || demonstrated(evidence, action.number).is_some_and(|share| share >= least))
         .collect();
     let all = !dead.is_empty() && dead.len() == tried;
     if needed.is_empty() && !all {
@@ -146,6 +151,25 @@ mod tests {
         evidence.played = vec![played(Seat::Random, 100, |tick| (vec![tick as f32], 1, 0.0))];
         evidence.forced = forced([0, 0, 0]);
         assert!(check(&evidence)[0].evidence.starts_with("3 of 3"), "nothing works");
+    }
+
+    #[test]
+    fn options_of_several_choices_count_by_themselves() {
+        let mut evidence = evidence("ppo", "");
+        evidence.action_space = ActionSpace::mixed([2, 3], 1);
+        let both = |walk: u32, jump: u32| ActionValue::Mixed { choices: vec![walk, jump], numbers: vec![0.0] };
+        assert!(takes(evidence.action_space, &both(1, 2), 1) && takes(evidence.action_space, &both(1, 2), 4));
+        assert!(!takes(evidence.action_space, &both(1, 2), 2), "the first option of the second choice");
+        let mut demonstrator = played(Seat::Demonstrator, 300, |tick| (vec![tick as f32], 0, 0.0));
+        demonstrator.episodes[0].actions = vec![both(0, 2); 300];
+        demonstrator.episodes[0].masks = vec![vec![true, true, true, true, false]; 300];
+        evidence.played = vec![demonstrator];
+        evidence.forced = vec![
+            ForcedAction { name: "jump".to_owned(), number: 4, tried: 3, effects: 0 },
+            ForcedAction { name: "walk".to_owned(), number: 1, tried: 3, effects: 1 },
+        ];
+        let signs: Vec<Sign> = check(&evidence).into_iter().map(|finding| finding.sign).collect();
+        assert_eq!(signs, [Sign::ForbiddenActions, Sign::DeadActions]);
     }
 
     #[test]

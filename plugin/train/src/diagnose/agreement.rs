@@ -195,9 +195,12 @@ pub fn check(evidence: &Evidence) -> Vec<LearningFinding> {
     let is_one = is_discrete && found.chance > 0.95 || !is_discrete && found.chance < 1e-6;
     // Neighbours among hundreds of values say little, but random actions do not last either.
     if !is_one && found.beyond_chance < NO_AGREEMENT && found.persistence < NO_AGREEMENT {
-        let cause = match is_discrete && noise > 0.5 {
-            true => format!("{} of the recorded actions are random", percent(noise)),
-            false => "the demonstrator acts at random, or by something that agents do not observe".to_owned(),
+        let (cause, advice) = match is_discrete && noise > 0.5 {
+            true => (format!("{} of the recorded actions are random", percent(noise)), [Advice::LessNoise].as_slice()),
+            false => (
+                "the demonstrator acts at random, or by something that agents do not observe".to_owned(),
+                [Advice::LessNoise, Advice::ObserveMore].as_slice(),
+            ),
         };
         return vec![LearningFinding::new(
             Sign::Contradictory,
@@ -207,7 +210,7 @@ pub fn check(evidence: &Evidence) -> Vec<LearningFinding> {
                 percent(found.beyond_chance.max(0.0))
             ),
             cause,
-            &[Advice::RecordAgain, Advice::ObserveMore],
+            advice,
         )];
     }
     if is_discrete && found.equal >= FEWEST / 3 && found.differing > MOST_DISAGREEMENT.max(3.0 * noise) {

@@ -22,6 +22,7 @@ pub fn check(evidence: &Evidence) -> Vec<LearningFinding> {
     found.extend(version(evidence, set));
     found.extend(no_replay(evidence, set));
     found.extend(idle(set));
+    found.extend(held_out(evidence, set));
     found.extend(other_levels(evidence, set));
     found.extend(never_won(set));
     found
@@ -81,6 +82,21 @@ fn idle(set: &RecordedSet) -> Option<LearningFinding> {
             counted(set.episodes.len() as u64, "recorded episode")
         ),
         "the recorder ran without a player, or keys were not recorded",
+        &[Advice::RecordAgain, Advice::ShowRecordings],
+    ))
+}
+
+/// Finds recordings of held-out levels, from which nothing may be learned.
+fn held_out(evidence: &Evidence, set: &RecordedSet) -> Option<LearningFinding> {
+    let count = Some(evidence.held_out_recorded).filter(|count| *count > 0)?;
+    Some(LearningFinding::new(
+        Sign::OtherLevels,
+        format!(
+            "{count} of {} are of the held-out levels {}",
+            counted(set.episodes.len() as u64, "recorded episode"),
+            evidence.experiment.test
+        ),
+        "results on these levels would say nothing, so no skills are learned from such recordings",
         &[Advice::RecordAgain, Advice::ShowRecordings],
     ))
 }
@@ -156,6 +172,9 @@ mod tests {
         assert_eq!(signs(&other), [Sign::OtherVersion]);
         assert_eq!(signs(&with(recorded(1, false))), [Sign::NeverWon]);
         assert_eq!(signs(&with(recorded(0, true))), [Sign::IdleRecordings], "action 0 does nothing");
+        let held_out = Evidence { held_out_recorded: 3, ..with(recorded(1, true)) };
+        assert_eq!(signs(&held_out), [Sign::OtherLevels]);
+        assert!(check(&held_out)[0].evidence.starts_with("3 of 4 recorded episodes are of the held-out levels"));
         let mut elsewhere = with(recorded(1, true));
         elsewhere.other_modes = vec!["hard".to_owned()];
         assert_eq!(signs(&elsewhere), [], "it is not known to fail");

@@ -12,6 +12,7 @@ use crate::{
     metrics_log::SUCCESS_RATE,
     runs::RunCurves,
 };
+use bevy_playbot::action::ActionSpace;
 
 /// What is known about a run, a set of recordings or a game. Checks read it and change nothing.
 #[derive(Clone, Debug)]
@@ -24,6 +25,8 @@ pub struct Evidence {
     pub names: Vec<String>,
     /// Names of the actions.
     pub action_names: Vec<String>,
+    /// The actions.
+    pub action_space: ActionSpace,
     /// The metrics of the run.
     pub curves: Option<RunCurves>,
     /// Episodes of several players.
@@ -32,10 +35,14 @@ pub struct Evidence {
     pub recordings: Option<RecordedSet>,
     /// Modes of the recordings that are of another task than the training.
     pub other_modes: Vec<String>,
+    /// Recorded episodes of held-out levels.
+    pub held_out_recorded: usize,
     /// Actions that were forced in copies of a World.
     pub forced: Vec<ForcedAction>,
     /// What the policy depends on.
     pub networks: Option<NetworkProbe>,
+    /// Share of the policy's ticks in which its normaliser clips each value; `None` without one.
+    pub clipped: Option<Vec<f64>>,
     /// How well the skill model knows its recordings.
     pub decoder: Option<DecoderProbe>,
     /// What the doctor found.
@@ -51,30 +58,25 @@ pub struct Evidence {
 impl Evidence {
     /// Creates the evidence of an experiment, with nothing but its settings.
     pub fn new(experiment: &Experiment, game_version: u32) -> Self {
-        let context = AdviceContext {
-            game: experiment.game.clone(),
-            mode: experiment.train.mode.clone(),
-            train: experiment.train.to_string(),
-            algorithm: experiment.algorithm,
-            run: None,
-            demos: experiment.demos.as_ref().map(|path| path.display().to_string()),
-        };
         Self {
             experiment: experiment.clone(),
             game_version,
             names: Vec::new(),
             action_names: Vec::new(),
+            action_space: ActionSpace::Discrete(0),
             curves: None,
             played: Vec::new(),
             recordings: None,
             other_modes: Vec::new(),
+            held_out_recorded: 0,
             forced: Vec::new(),
             networks: None,
+            clipped: None,
             decoder: None,
             doctor: None,
             faults: Vec::new(),
             notes: Vec::new(),
-            context,
+            context: AdviceContext::new(experiment),
         }
     }
 

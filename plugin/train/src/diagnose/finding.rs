@@ -61,8 +61,12 @@ pub enum Sign {
     OtherObservations,
     /// Nothing trains the critic, or it explains nothing.
     BlindCritic,
+    /// The policy earns less than random actions do.
+    BelowChance,
     /// Under one in a hundred episodes is rewarded.
     RareReward,
+    /// A lesson of the curriculum that was never learned.
+    LessonNotLearned,
     /// The policy moves too far in an update.
     MovesTooFar,
     /// Units of the policy let no gradient through.
@@ -119,7 +123,9 @@ impl Sign {
             Self::Saturated => "observation-saturated",
             Self::OtherObservations => "observations-not-as-recorded",
             Self::BlindCritic => "critic-explains-nothing",
+            Self::BelowChance => "policy-worse-than-chance",
             Self::RareReward => "reward-rarely-seen",
+            Self::LessonNotLearned => "lesson-not-learned",
             Self::MovesTooFar => "policy-moves-too-far",
             Self::DeadUnits => "dead-units",
             Self::BelowDecoder => "policy-worse-than-decoder",
@@ -164,7 +170,9 @@ impl Sign {
             Self::Saturated => "observed values lie beyond the normaliser",
             Self::OtherObservations => "the game is not observed as the recordings are",
             Self::BlindCritic => "the critic explains nothing",
+            Self::BelowChance => "the policy does worse than random actions",
             Self::RareReward => "reward is rarely seen",
+            Self::LessonNotLearned => "a lesson is not learned",
             Self::MovesTooFar => "the policy moves too far",
             Self::DeadUnits => "units of the policy are dead",
             Self::BelowDecoder => "the policy does worse than the decoder it began as",
@@ -213,7 +221,7 @@ impl LearningFinding {
 }
 
 /// All findings about one run, set of recordings or game, the most likely cause first.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Diagnosis {
     /// The findings.
     pub findings: Vec<LearningFinding>,
@@ -284,6 +292,11 @@ impl fmt::Display for Diagnosis {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::testing::evidence;
+
+    fn context() -> AdviceContext {
+        evidence("ppo", "").context
+    }
 
     fn finding(sign: Sign) -> LearningFinding {
         LearningFinding::new(sign, format!("evidence of {}", sign.name()), "a cause", &[Advice::Doctor])
@@ -292,31 +305,30 @@ mod tests {
     #[test]
     fn causes_come_before_their_consequences() {
         let found = [Sign::Collapsed, Sign::LearningRate, Sign::ConstantObservation].map(finding).to_vec();
-        let diagnosis = Diagnosis::new(found, Vec::new(), AdviceContext::default());
+        let diagnosis = Diagnosis::new(found, Vec::new(), context());
         let signs: Vec<_> = diagnosis.findings.iter().map(|finding| finding.sign).collect();
         assert_eq!(signs, [Sign::ConstantObservation, Sign::LearningRate, Sign::Collapsed]);
     }
 
     #[test]
     fn json_has_the_four_fields_of_each_finding() {
-        let context = AdviceContext { game: "maze2d".to_owned(), ..AdviceContext::default() };
-        let diagnosis = Diagnosis::new(vec![finding(Sign::Differs)], Vec::new(), context);
+        let diagnosis = Diagnosis::new(vec![finding(Sign::Differs)], Vec::new(), context());
         let expected = json!({ "findings": [{
             "sign": "game-differs-from-itself", "evidence": "evidence of game-differs-from-itself", "cause": "a cause",
-            "try": "look for the first difference with `playbot doctor maze2d --mode MODE`",
+            "try": "look for the first difference with `playbot doctor coinrun --mode hard`",
         }], "notes": [] });
         assert_eq!(diagnosis.to_json(), expected);
-        assert_eq!(Diagnosis::default().to_json(), json!({ "findings": [], "notes": [] }));
+        assert_eq!(Diagnosis::new(Vec::new(), Vec::new(), context()).to_json(), json!({ "findings": [], "notes": [] }));
     }
 
     #[test]
     fn a_page_and_text_show_every_finding_and_what_was_left_out() {
         let notes = vec!["pictures are not looked at".to_owned()];
-        let diagnosis = Diagnosis::new(vec![finding(Sign::NoReward)], notes, AdviceContext::default());
+        let diagnosis = Diagnosis::new(vec![finding(Sign::NoReward)], notes, context());
         let text = diagnosis.to_string();
         assert!(text.starts_with("1. no reward is ever seen (reward-never-seen)\n   evidence: "), "{text}");
         assert!(text.ends_with("note: pictures are not looked at"), "{text}");
         assert_eq!(diagnosis.section().tables.len(), 1);
-        assert!(Diagnosis::default().section().tables.is_empty());
+        assert!(Diagnosis::new(Vec::new(), Vec::new(), context()).section().tables.is_empty());
     }
 }

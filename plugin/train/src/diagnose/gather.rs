@@ -5,19 +5,21 @@ use crate::{
     diagnose::{
         evidence::Evidence,
         forced::force,
-        networks::{probe, probe_decoder},
+        networks::{NetworkProbe, probe, probe_decoder},
+        observation::note_constants,
         play::{PlayPlan, PlayedEpisode, Seat, play},
-        recordings::RecordedSet,
+        recordings::{RecordedEpisode, RecordedSet},
     },
     error::RunError,
-    experiment::{Algorithm, Experiment},
-    metrics_log::EPISODES as EPISODES_TAG,
+    experiment::Experiment,
+    metrics_log::{EPISODES as EPISODES_TAG, SUCCESS_RATE},
     run_dir::{OpenedRun, RunDir},
     runs::{RunCurves, RunsError},
     trainer::TrainedLearner,
 };
 use bevy_playbot::{
-    bot::BlindBot, demo::file::DemoFileError, fault::Fault, policy::ActionDraw, skill_prior::SkillPrior,
+    action::ActionValue, bot::BlindBot, demo::file::DemoFileError, fault::Fault, policy::ActionDraw,
+    skill_prior::SkillPrior,
 };
 use playbot_harness::{
     doctor::{DoctorOptions, examine},
@@ -25,26 +27,32 @@ use playbot_harness::{
     game::{Game, idle_action},
     level_files::is_level_files,
     parallel::on_threads,
+    sealed_file::file_checksum,
     split::LevelSplit,
 };
 use playbot_learner::{DeviceKind, FileError, HasExitCode, LearnError, Policy, SkillModel};
 use playbot_report::{counted, readable};
-use std::path::{Path, PathBuf};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 use thiserror::Error;
 
 /// Episodes of each player, and of the policy on training and on held-out levels.
 const EPISODES: u64 = 8;
 const POLICY_EPISODES: u64 = 16;
 
-/// Most ticks of each player, all agents together, and of the demonstrator: whether it is paid decides about the game.
+/// Most ticks of each blind player, all agents together, and of the demonstrator and the policy: whether the one is paid
+/// decides about the game, and the other's episodes are compared to their ends.
 const TICKS: usize = 6000;
-const DEMONSTRATOR_TICKS: usize = 24_000;
+const LONG_TICKS: usize = 24_000;
 
 /// Courses of episodes from which actions are forced that have changed nothing so far.
 const COURSES: usize = 6;
 
-/// Updates under which a run shows little.
+/// Updates and ended episodes under which a run shows little.
 const FEWEST_UPDATES: usize = 10;
+const FEWEST_ENDED: f64 = 20.0;
 
 /// Ticks of each of the doctor's comparisons.
 const DOCTOR_TICKS: u32 = 60;
@@ -135,6 +143,13 @@ pub fn of_run(
     let OpenedRun { run, experiment, info } = RunDir::open(path)?;
     let mut evidence = begin(game, &experiment);
     evidence.context.run = Some(path.display().to_string());
+    let file = info.skills.as_ref().and_then(|checksum| find_skills(path, checksum));
+    let own = match &file {
+        Some(file) if skills.is_none() => Some(SkillModel::load(file, gathering.device)?),
+        _ => None,
+    };
+    let skills = skills.or(own.as_ref());
+    evidence.context.skills = file.map(|file| file.display().to_string());
     evidence.curves = Some(RunCurves::read(path)?);
     read_recordings(&mut evidence, game, gathering)?;
     if let Some(version) = Some(info.game_version).filter(|version| *version != game.version()) {
@@ -147,6 +162,7 @@ pub fn of_run(
     if !gathering.replays {
         evidence.notes.push("nothing was played: --replays looks at rewards, observations and actions, too".to_owned());
         decode(&mut evidence, skills)?;
+        note_failure(&mut evidence);
         return Ok(evidence);
     }
     let policy = match run.checkpoint(CheckpointChoice::Last) {
@@ -165,7 +181,34 @@ pub fn of_run(
     };
     play_all(&mut evidence, game, policy.as_ref(), gathering)?;
     decode(&mut evidence, skills)?;
+    note_failure(&mut evidence);
     Ok(evidence)
+}
+
+/// Looks for the file of a run's skill model, by its checksum: in the folder of the run, beside it, and where the program
+/// runs.
+fn find_skills(run: &Path, checksum: &str) -> Option<PathBuf> {
+    let here = Path::new(".");
+    let folders = [Some(run), run.parent().filter(|folder| !folder.as_os_str().is_empty()), Some(here)];
+    let mut files: Vec<PathBuf> = Vec::new();
+    for folder in folders.into_iter().flatten() {
+        let entries = fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
+        let models = entries.map(|entry| entry.path()).filter(|path| path.extension() == Some("safetensors".as_ref()));
+        let named = models.map(|path| path.strip_prefix(here).map_or(path.clone(), Path::to_owned));
+        files.extend(named);
+    }
+    files.sort();
+    files.into_iter().find(|file| file_checksum(file).is_ok_and(|found| found == checksum))
+}
+
+/// Notes that a run which is old enough does not get to the goal: without a finding it may be taken for a sound one.
+fn note_failure(evidence: &mut Evidence) {
+    let Some(curves) = &evidence.curves else { return };
+    let episodes = curves.last(EPISODES_TAG).unwrap_or_default();
+    if episodes >= FEWEST_ENDED && curves.last(SUCCESS_RATE).is_some_and(|success| success == 0.0) {
+        let of = counted(episodes as u64, "ended episode");
+        evidence.notes.push(format!("the goal was not reached in the last of {of}, whatever is found or not"));
+    }
 }
 
 /// Gathers evidence of recordings, for an experiment of their game.
@@ -191,6 +234,11 @@ pub fn of_recordings(
     }
     if let Some(set) = all {
         evidence.context.demos = Some(set.path.display().to_string());
+        let test = &experiment.test;
+        let is_held_out = |episode: &&RecordedEpisode| {
+            *episode.mode == *test.mode && (test.first..=test.last).contains(&episode.episode.level_seed)
+        };
+        evidence.held_out_recorded = set.episodes.iter().filter(is_held_out).count();
         add_recordings(&mut evidence, game, set, gathering);
     }
     decode(&mut evidence, skills)?;
@@ -222,7 +270,7 @@ fn note_youth(evidence: &mut Evidence) {
     let Some(curves) = evidence.curves.as_ref().filter(|_| evidence.experiment.algorithm.is_trained()) else { return };
     let updates = curves.curve(EPISODES_TAG).len();
     let episodes = curves.last(EPISODES_TAG).unwrap_or_default();
-    if updates < FEWEST_UPDATES || episodes < 1.0 {
+    if updates < FEWEST_UPDATES || episodes < FEWEST_ENDED {
         evidence.notes.push(format!(
             "the run shows little yet, so most signs cannot be seen: it has {} and {}",
             counted(updates as u64, "update"),
@@ -237,15 +285,14 @@ fn begin(game: &dyn Game, experiment: &Experiment) -> Evidence {
         evidence.names = game.observation().names;
     }
     evidence.action_names = game.tools().input.action_names();
+    evidence.action_space = game.actions();
     evidence
 }
 
 /// Reads the recordings that the experiment learns from, if it does and they are there.
 fn read_recordings(evidence: &mut Evidence, game: &dyn Game, gathering: &Gathering<'_>) -> Result<(), DiagnoseError> {
     let experiment = &evidence.experiment;
-    let imitates = experiment.algorithm == Algorithm::Imitation && !experiment.imitation.dagger;
-    let learns = imitates || experiment.algorithm.learns_from_demos();
-    let named = experiment.demos.as_deref().filter(|_| learns);
+    let named = experiment.demos.as_deref().filter(|_| experiment.learns_from_demos());
     let Some(path) = named.map(gathering.recordings) else { return Ok(()) };
     if path.exists() {
         add_recordings(evidence, game, RecordedSet::read(&path)?, gathering);
@@ -287,21 +334,31 @@ fn play_all(
     let faults = evidence.played.iter().filter_map(|played| played.fault.clone());
     evidence.faults.extend(faults);
     note_ablations(evidence);
+    evidence.notes.extend(note_constants(evidence));
     if evidence.faults.is_empty() {
         (gathering.progress)("force actions");
         force_actions(evidence, game);
         (gathering.progress)("examine the game");
         examine_game(evidence, game);
     }
-    if let Some(Trained { policy, prior, .. }) = trained {
+    if let Some(Trained { policy, prior, decoder }) = trained.filter(|_| !experiment.observation_config().is_image()) {
         let rows: Vec<&[f32]> =
             evidence.played.iter().flat_map(|played| &played.episodes).flat_map(PlayedEpisode::rows).collect();
-        evidence.networks = match experiment.observation_config().is_image() {
-            true => None,
-            false => probe(policy, prior.as_ref(), &rows)?,
-        };
+        evidence.networks = probe(policy, decoder.as_ref(), prior.as_ref(), &rows)?;
+        evidence.notes.extend(evidence.networks.as_ref().and_then(skills_in_words));
+        let own = evidence.played(Seat::Policy).into_iter().flat_map(|played| &played.episodes);
+        evidence.clipped = policy.clipped_shares(own.flat_map(PlayedEpisode::rows));
     }
     Ok(())
+}
+
+/// Says how much skills decide.
+fn skills_in_words(probe: &NetworkProbe) -> Option<String> {
+    let skill = readable(probe.skill_information?);
+    let prior = probe.prior_spread.map_or_else(String::new, |spread| {
+        format!(", and the prior's mean skill varies by {} from state to state", readable(spread))
+    });
+    Some(format!("a skill has {skill} nats of information on the action in a state{prior}"))
 }
 
 /// Notes what the policy earns without something that was learned, which is worth knowing where nothing is wrong.
@@ -332,23 +389,24 @@ fn jobs(game: &dyn Game, experiment: &Experiment, trained: Option<&Trained>) -> 
         (Seat::Idle, Player::Blind(BlindBot::Constant(idle_action(game))), plan(&experiment.train, EPISODES)),
     ];
     if game.tools().bots.demonstrator().is_some() {
-        let plan = PlayPlan { ticks: DEMONSTRATOR_TICKS, ..plan(&experiment.train, EPISODES) };
+        let plan = PlayPlan { ticks: LONG_TICKS, ..plan(&experiment.train, EPISODES) };
         jobs.push((Seat::Demonstrator, Player::Demonstrator, plan));
     }
     if let Some(Trained { policy, prior, decoder }) = trained {
+        let long_plan = |split: &LevelSplit| PlayPlan { ticks: LONG_TICKS, ..plan(split, POLICY_EPISODES) };
         let of = |policy: &Policy, prior: &Option<SkillPrior>| {
             let (policy, prior) = (policy.clone(), prior.clone());
             Player::Policy { policy, prior, draw: ActionDraw::Sample }
         };
-        jobs.push((Seat::Policy, of(policy, prior), plan(&experiment.train, POLICY_EPISODES)));
-        jobs.push((Seat::HeldOut, of(policy, prior), plan(&experiment.test, POLICY_EPISODES)));
+        jobs.push((Seat::Policy, of(policy, prior), long_plan(&experiment.train)));
+        jobs.push((Seat::HeldOut, of(policy, prior), long_plan(&experiment.test)));
         // What training and the prior have added: the same levels without them.
         if let Some(decoder) = decoder {
-            jobs.push((Seat::Decoder, of(decoder, prior), plan(&experiment.train, POLICY_EPISODES)));
+            jobs.push((Seat::Decoder, of(decoder, prior), long_plan(&experiment.train)));
         }
         if let Some(learned) = prior.as_ref().filter(|prior| prior.prior.observation().is_some()) {
             let any = SkillPrior { prior: learned.prior.whatever_the_state(), ..learned.clone() };
-            jobs.push((Seat::AnySkill, of(policy, &Some(any)), plan(&experiment.train, POLICY_EPISODES)));
+            jobs.push((Seat::AnySkill, of(policy, &Some(any)), long_plan(&experiment.train)));
         }
     }
     jobs
@@ -391,12 +449,17 @@ fn examine_game(evidence: &mut Evidence, game: &dyn Game) {
     }
 }
 
-/// Compares a skill model with the recordings.
+/// Compares a skill model with the recordings, or with a demonstrator that has just played the recorded task: that is not
+/// what the model was learned from.
 fn decode(evidence: &mut Evidence, skills: Option<&SkillModel>) -> Result<(), DiagnoseError> {
     let (Some(model), Some(set)) = (skills, &evidence.recordings) else { return Ok(()) };
-    let seen = set.seen();
+    let live = evidence.played(Seat::Demonstrator).filter(|_| evidence.other_modes.is_empty());
+    let seen: Vec<(Vec<&[f32]>, Vec<ActionValue>)> = match live {
+        Some(live) => live.episodes.iter().map(|it| (it.rows().collect(), it.actions.clone())).collect(),
+        None => set.seen(),
+    };
     let steps: Vec<_> =
         seen.iter().flat_map(|(rows, actions)| rows.iter().copied().zip(actions.iter().cloned())).collect();
-    evidence.decoder = probe_decoder(model, &steps)?;
+    evidence.decoder = probe_decoder(model, &steps, live.is_some())?;
     Ok(())
 }

@@ -7,10 +7,12 @@ use crate::{
         finding::{LearningFinding, Sign},
     },
     experiment::{Algorithm, Experiment, LearnerKind},
-    metrics_log::{EPISODES, EPISODIC_LENGTH, EPISODIC_RETURN, SUCCESS_RATE, is_settled},
+    metrics_log::{EPISODES, EPISODIC_LENGTH, EPISODIC_RETURN, LESSON, LESSON_SUCCESS, SUCCESS_RATE, is_settled},
     runs::RunCurves,
+    train_run::never_learns,
 };
-use playbot_report::{readable, whole};
+use playbot_learner::PpoConfig;
+use playbot_report::{percent, readable, whole};
 
 /// Updates over which a metric is averaged.
 const RECENT: usize = 5;
@@ -29,6 +31,10 @@ const LARGEST_CLIP: f64 = 1.0;
 const LARGEST_KL: f64 = 0.5;
 const LARGEST_CLIP_SHARE: f64 = 0.6;
 const SMALLEST_KL: f64 = 1e-6;
+/// A clip range within which a policy hardly moves.
+const SMALLEST_CLIP: f64 = 1e-3;
+/// The default learning rate of PPO, from which on a higher one is no advice.
+const USUAL_RATE: f64 = 5e-4;
 /// An entropy bonus of this weight outweighs advantages that are normalised to a deviation of 1.
 const LARGEST_ENTROPY_WEIGHT: f64 = 0.5;
 /// A value loss beyond what returns of deviation 1 cost.
@@ -59,6 +65,7 @@ pub fn check(experiment: &Experiment, curves: &RunCurves) -> Vec<LearningFinding
         found.extend(collapse(experiment, &tag, succeeds));
     }
     found.extend(rewards(experiment, curves, &tag));
+    found.extend(lessons(experiment, curves));
     found.extend(episodes(experiment, curves));
     found
 }
@@ -85,6 +92,10 @@ fn and_kl(tag: &Tag<'_>, what: &str, of: impl Fn(&Tag<'_>, &str) -> String) -> S
 fn settings(experiment: &Experiment, tag: &Tag<'_>) -> Vec<LearningFinding> {
     let Experiment { ppo, sac, score, algorithm, .. } = experiment;
     let mut found = Vec::new();
+    if let Some(words) = never_learns(experiment) {
+        let cause = "the training ends before its policy begins to learn";
+        found.push(LearningFinding::new(Sign::Unmoved, words, cause, &[Advice::TrainLonger, Advice::BeginAtOnce]));
+    }
     let (rates, is_ppo) = match algorithm.learner() {
         LearnerKind::Ppo if *algorithm == Algorithm::Imitation => {
             (vec![("imitation.lr", experiment.imitation.lr)], false)
@@ -150,13 +161,35 @@ fn steps_of_policy(experiment: &Experiment, tag: &Tag<'_>, is_solved: bool) -> V
             readable(kl),
             readable(clip)
         );
-        // Steps that are too large can leave nothing that moves, and are reported already.
+        // Steps that are too large can leave nothing that moves.
+        let (at, worst) = largest_steps(experiment, tag("approx_kl"));
         let can_move = ppo.lr < HIGHEST_RATE;
         // A decoder may solve the task without a policy that learns.
         let is_held = ppo.lr < LOWEST_RATE || ppo.max_grad_norm < LOWEST_RATE;
-        if kl.abs() < SMALLEST_KL && clip == 0.0 && (!is_solved || is_held) && can_move {
+        let hardly_moves = kl.abs() < if ppo.clip < SMALLEST_CLIP { ppo.clip } else { SMALLEST_KL };
+        let is_still = hardly_moves && (!is_solved || is_held);
+        if is_still && worst > LARGEST_KL {
+            // The rate is reported already where it is beyond all bounds.
+            found.extend(can_move.then(|| {
+                LearningFinding::new(
+                    Sign::MovesTooFar,
+                    format!(
+                        "around step {} the KL divergence of an update was {}, and by now it is {}: the policy has stopped",
+                        whole(at as f64),
+                        readable(worst),
+                        readable(kl)
+                    ),
+                    too_much(ppo),
+                    &[Advice::LowerRate, Advice::FewerPasses],
+                )
+            }));
+        } else if is_still && can_move && (clip == 0.0 || ppo.clip < SMALLEST_CLIP) {
             let (cause, advice) = match () {
                 () if ppo.lr < 1e-5 => (format!("`ppo.lr` is {}", readable(ppo.lr)), vec![Advice::RaiseRate]),
+                () if ppo.clip < SMALLEST_CLIP => {
+                    let clip = readable(ppo.clip);
+                    (format!("`ppo.clip` is {clip}: hardly any action may become more likely"), vec![Advice::UsualClip])
+                }
                 () if ppo.max_grad_norm < 1e-3 => {
                     let bound = readable(ppo.max_grad_norm);
                     (
@@ -167,21 +200,36 @@ fn steps_of_policy(experiment: &Experiment, tag: &Tag<'_>, is_solved: bool) -> V
                 () => {
                     let norm = last(tag, "grad_norm");
                     let words = format!("nothing in a rollout is better than the rest (the gradient is {norm})");
-                    (words, vec![Advice::MeasureBots, Advice::RaiseRate])
+                    let can_be_higher = ppo.lr < USUAL_RATE;
+                    let raise = can_be_higher.then_some(Advice::RaiseRate);
+                    (words, [Some(Advice::MeasureBots), raise].into_iter().flatten().collect())
                 }
             };
             found.push(LearningFinding::new(Sign::Unmoved, evidence, cause, &advice));
         } else if !is_solved && ppo.epochs < MOST_PASSES && (kl > LARGEST_KL || clip > LARGEST_CLIP_SHARE) {
-            let cause = format!("`ppo.lr` = {} or `ppo.epochs` = {} is too much", readable(ppo.lr), ppo.epochs);
             found.push(LearningFinding::new(
                 Sign::MovesTooFar,
                 evidence,
-                cause,
+                too_much(ppo),
                 &[Advice::LowerRate, Advice::FewerPasses],
             ));
         }
     }
     found
+}
+
+/// Returns the largest mean KL divergence of three updates, and the step at which it was.
+fn largest_steps(experiment: &Experiment, curve: &[(u64, f64)]) -> (u64, f64) {
+    let updates = before_the_rate_is_0(experiment, curve).windows(3);
+    let means = updates.map(|three| (three[1].0, three.iter().map(|(_, kl)| kl / 3.0).sum::<f64>()));
+    means.fold((0, 0.0), |most, now| if now.1 > most.1 { now } else { most })
+}
+
+/// Says which settings let a policy move too far.
+fn too_much(ppo: &PpoConfig) -> String {
+    let clip =
+        if ppo.clip > LARGEST_CLIP { format!(", or `ppo.clip` = {}", readable(ppo.clip)) } else { String::new() };
+    format!("`ppo.lr` = {}, or `ppo.epochs` = {}{clip} is too much", readable(ppo.lr), ppo.epochs)
 }
 
 fn critic(experiment: &Experiment, tag: &Tag<'_>, succeeds: bool) -> Option<LearningFinding> {
@@ -257,6 +305,28 @@ fn rewards(experiment: &Experiment, curves: &RunCurves, tag: &Tag<'_>) -> Vec<Le
     found
 }
 
+/// Finds that a training has ended before its last lesson.
+fn lessons(experiment: &Experiment, curves: &RunCurves) -> Option<LearningFinding> {
+    let lessons = &experiment.curriculum.lessons;
+    let (lesson, success) = (curves.last(LESSON)?, curves.last(LESSON_SUCCESS));
+    let at = (lesson as usize).checked_sub(1).filter(|at| *at < lessons.len())?;
+    (curves.last_step() >= experiment.whole_steps()).then(|| {
+        let wanted = lessons[at].success.unwrap_or(experiment.curriculum.success);
+        LearningFinding::new(
+            Sign::LessonNotLearned,
+            format!(
+                "the training ended in lesson {} of {}, with {} of its episodes won and {} wanted",
+                at + 1,
+                lessons.len() + 1,
+                percent(success.unwrap_or_default()),
+                percent(wanted)
+            ),
+            "the lesson is too hard for the steps, or more success is wanted than it allows",
+            &[Advice::TrainLonger, Advice::EasierLesson],
+        )
+    })
+}
+
 fn episodes(experiment: &Experiment, curves: &RunCurves) -> Vec<LearningFinding> {
     let mut found = Vec::new();
     let (gamma, _) = discount_and_norm(experiment);
@@ -292,7 +362,7 @@ mod tests {
 
     fn experiment(algorithm: &str, rest: &str) -> Experiment {
         let text = format!(
-            r#"(game: "coinrun", train: "hard:0..63", test: "hard:64..127", demos: "d", steps: 1000, algorithm: "{algorithm}", {rest})"#
+            r#"(game: "coinrun", train: "hard:0..63", test: "hard:64..127", demos: "d", steps: 1000000, algorithm: "{algorithm}", {rest})"#
         );
         parse_experiment(&text, Path::new("x.ron")).expect("valid")
     }
@@ -343,6 +413,8 @@ mod tests {
             ("ppo", "ppo: (vf_coef: 0.0)", Sign::BlindCritic),
             ("ppo", "ppo: (gamma: 0.5)", Sign::ShortHorizon),
             ("sac", "sac: (gamma: 0.5)", Sign::ShortHorizon),
+            ("sac", "sac: (learning_starts: 2000000)", Sign::Unmoved),
+            ("ppo", "ppo: (critic_warmup: 90000)", Sign::Unmoved),
         ] {
             assert_eq!(signs(&experiment(algorithm, settings), &[]), [sign], "{settings}");
         }
@@ -383,11 +455,55 @@ mod tests {
         for (settings, words) in [
             ("ppo: (lr: 0.000000001)", "`ppo.lr` is"),
             ("ppo: (max_grad_norm: 0.00000001)", "`ppo.max_grad_norm` is"),
+            ("ppo: (clip: 0.00001)", "`ppo.clip` is"),
             ("", "nothing in a rollout is better"),
         ] {
             let found = check(&experiment("ppo", settings), &still);
             assert!(found[0].cause.contains(words), "{}", found[0].cause);
         }
+    }
+
+    #[test]
+    fn a_tiny_clip_holds_a_policy_though_all_actions_are_clipped() {
+        let held = [("losses/approx_kl", 2e-6), ("losses/clip_fraction", 0.9)];
+        assert_eq!(signs(&experiment("ppo", "ppo: (clip: 0.00001)"), &held), [Sign::Unmoved]);
+    }
+
+    #[test]
+    fn a_policy_that_jumped_and_then_stopped_has_moved_too_far() {
+        let mut curves = RunCurves::default();
+        for update in 1..=10 {
+            let kl = if update < 5 { 9.0 } else { 0.0 };
+            curves.push(1000 * update, [("losses/approx_kl", kl), ("losses/clip_fraction", kl / 10.0)].into_iter());
+        }
+        let found = check(&experiment("ppo", "ppo: (lr: 0.01, clip: 100.0)"), &curves);
+        assert_eq!(found.iter().map(|finding| finding.sign).collect::<Vec<_>>(), [Sign::MovesTooFar]);
+        assert_eq!(
+            found[0].evidence,
+            "around step 2,000 the KL divergence of an update was 9.000, and by now it is 0: the policy has stopped"
+        );
+        assert!(
+            found[0].cause.contains("`ppo.lr` = 0.01") && found[0].cause.contains("`ppo.clip` = 100"),
+            "{:?}",
+            found[0]
+        );
+    }
+
+    #[test]
+    fn a_lesson_that_is_never_left_is_found_at_the_end() {
+        let lessons = r#"curriculum: (lessons: [(levels: "easy:0..9", success: 0.7)])"#;
+        let experiment = Experiment { steps: 10_000, ..experiment("ppo", lessons) };
+        let in_lesson = |lesson: f64, steps: u64| {
+            let mut curves = RunCurves::default();
+            curves.push(steps, [(LESSON, lesson), (LESSON_SUCCESS, 0.18)].into_iter());
+            check(&experiment, &curves)
+        };
+        let found = in_lesson(1.0, experiment.whole_steps());
+        assert_eq!(found.iter().map(|finding| finding.sign).collect::<Vec<_>>(), [Sign::LessonNotLearned]);
+        let words = "the training ended in lesson 1 of 2, with 18.0 % of its episodes won and 70.0 % wanted";
+        assert_eq!(found[0].evidence, words);
+        assert!(in_lesson(1.0, 1000).is_empty(), "it goes on");
+        assert!(in_lesson(2.0, experiment.whole_steps()).is_empty(), "it is the last one");
     }
 
     #[test]

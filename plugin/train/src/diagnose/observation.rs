@@ -25,6 +25,9 @@ const MOST_CLIPPED: f64 = 0.02;
 /// Share of the recorded rows in which a value must be another one than the constant that is played.
 const OFTEN: f64 = 0.2;
 
+/// Share of constant values from which on hardly anything is observed.
+const NEARLY_ALL: f64 = 0.95;
+
 /// Fewest rows about which a statistic says something.
 const FEWEST_ROWS: usize = 50;
 
@@ -119,7 +122,50 @@ pub fn check(evidence: &Evidence) -> Vec<LearningFinding> {
     found.extend(constant(evidence, &columns));
     found.extend(scales(evidence, &columns));
     found.extend(not_as_recorded(evidence, &recorded));
+    found.extend(clipped(evidence));
     found
+}
+
+/// Notes values that never change, where they are some of many and no recording says that they should.
+pub fn note_constants(evidence: &Evidence) -> Option<String> {
+    let rows = || evidence.played.iter().flat_map(|played| &played.episodes).flat_map(PlayedEpisode::rows);
+    let columns = statistics(rows());
+    let sets = EntitySet::all_in(&evidence.names);
+    let constants = EntitySet::constant_values(&sets, columns.len(), |number| columns[number].is_constant());
+    let is_known = evidence.names.is_empty() || columns.first().is_none_or(|column| column.rows < FEWEST_ROWS);
+    if is_known || constants.is_empty() || constants.len() == columns.len() {
+        return None;
+    }
+    let names: Vec<String> = constants.iter().map(|&number| evidence.value_name(number)).collect();
+    Some(format!(
+        "{} of {} observed values are the same in all {} ticks that were played: {}",
+        constants.len(),
+        columns.len(),
+        whole(columns[0].rows as f64),
+        list(&names)
+    ))
+}
+
+/// Finds values that the policy's own normaliser clips in the ticks that it plays.
+fn clipped(evidence: &Evidence) -> Option<LearningFinding> {
+    let shares = evidence.clipped.as_ref()?;
+    let often = shares.iter().enumerate().filter(|(_, share)| **share > MOST_CLIPPED);
+    let names: Vec<String> = often.map(|(number, _)| evidence.value_name(number)).collect();
+    let most = shares.iter().copied().fold(0.0, f64::max);
+    (!names.is_empty()).then(|| {
+        LearningFinding::new(
+            Sign::Saturated,
+            format!(
+                "{}: {} more than {CLIPPED_AT} deviations from the normaliser's mean, in up to {} of the policy's ticks",
+                list(&names),
+                if names.len() == 1 { "lies" } else { "lie" },
+                percent(most)
+            ),
+            "the normaliser clips what lies far outside of what it was learned from: other levels, other units, or values \
+             that are rarely anything but 0",
+            &[Advice::ScaleInGame, Advice::RecordAgain],
+        )
+    })
 }
 
 /// Returns the share of the recorded rows in which a value is another one than this.
@@ -177,12 +223,16 @@ fn constant(evidence: &Evidence, columns: &[ColumnStatistics]) -> Option<Learnin
     let shown = if varied.is_empty() { &constants } else { &varied };
     let names: Vec<String> = shown.iter().map(|&number| evidence.value_name(number)).collect();
     let all = (0..columns.len()).all(is_constant);
-    if !all && varied.is_empty() {
+    let nearly_all = constants.len() as f64 >= NEARLY_ALL * columns.len() as f64;
+    if !nearly_all && varied.is_empty() {
         return None;
     }
     let which = match (all, varied.is_empty()) {
         (true, _) => format!("all {} observed values", columns.len()),
-        (false, _) => format!("{} of {} observed values, which vary in the recordings", varied.len(), columns.len()),
+        (false, true) => format!("{} of {} observed values", constants.len(), columns.len()),
+        (false, false) => {
+            format!("{} of {} observed values, which vary in the recordings", varied.len(), columns.len())
+        }
     };
     Some(LearningFinding::new(
         Sign::ConstantObservation,
@@ -234,9 +284,9 @@ fn scales(evidence: &Evidence, columns: &[ColumnStatistics]) -> Option<LearningF
     })
 }
 
-/// Compares what the demonstrator observes now, or else the policy, with what was recorded.
+/// Compares what the demonstrator observes now with what was recorded. A policy may go where no demonstrator goes.
 fn not_as_recorded(evidence: &Evidence, recorded: &[ColumnStatistics]) -> Vec<LearningFinding> {
-    let now = [Seat::Demonstrator, Seat::Policy].into_iter().find_map(|seat| evidence.played(seat));
+    let now = evidence.played(Seat::Demonstrator);
     let (Some(Played { seat, episodes, .. }), false) = (now, recorded.is_empty()) else { return Vec::new() };
     let (mut beyond, mut values) = (vec![0_usize; recorded.len()], 0_usize);
     let sets = EntitySet::all_in(&evidence.names);
@@ -263,14 +313,8 @@ fn not_as_recorded(evidence: &Evidence, recorded: &[ColumnStatistics]) -> Vec<Le
         return Vec::new();
     }
     let most = beyond.iter().max().copied().unwrap_or_default() as f64 / values as f64;
-    let (sign, cause) = match evidence.is_normalised() && *seat == Seat::Policy {
-        true => (Sign::Saturated, "the normaliser knows the recordings, and clips what lies far outside of them"),
-        false => {
-            (Sign::OtherObservations, "the sensor has changed since the recording: its units, its order or its meaning")
-        }
-    };
     vec![LearningFinding::new(
-        sign,
+        Sign::OtherObservations,
         format!(
             "{}: {} more than {CLIPPED_AT} deviations from the recorded mean, in up to {} of {} of {}",
             list(&names),
@@ -279,7 +323,7 @@ fn not_as_recorded(evidence: &Evidence, recorded: &[ColumnStatistics]) -> Vec<Le
             counted(values as u64, "tick"),
             seat.name()
         ),
-        cause,
+        "the sensor has changed since the recording: its units, its order or its meaning",
         &[Advice::RecordAgain, Advice::RaiseVersion],
     )]
 }
@@ -303,7 +347,30 @@ mod tests {
     #[test]
     fn values_that_vary_within_bounds_are_healthy() {
         assert_eq!(signs(&with_rows(|tick| vec![tick as f32 / 100.0, 1.0 - tick as f32 / 50.0])), []);
-        assert_eq!(signs(&with_rows(|tick| vec![tick as f32 / 100.0, 3.0])), [], "one value may be constant");
+        let evidence = with_rows(|tick| vec![tick as f32 / 100.0, 3.0]);
+        assert_eq!(signs(&evidence), [], "one value may be constant");
+        let note = note_constants(&evidence).expect("it is told");
+        assert_eq!(note, "1 of 2 observed values are the same in all 100 ticks that were played: `speed`");
+    }
+
+    #[test]
+    fn nearly_constant_observations_and_clipped_values_are_found() {
+        let mut evidence = with_rows(|tick| {
+            let mut row = vec![3.0; 40];
+            row[7] = tick as f32 / 100.0;
+            row
+        });
+        evidence.names = (0..40).map(|number| format!("v{number}")).collect();
+        let found = check(&evidence);
+        assert_eq!(found[0].sign, Sign::ConstantObservation);
+        assert!(found[0].evidence.starts_with("39 of 40 observed values are the same"), "{:?}", found[0]);
+        let mut evidence = with_rows(|tick| vec![tick as f32 / 100.0, 1.0 - tick as f32 / 50.0]);
+        evidence.clipped = Some(vec![0.0, 0.01]);
+        assert_eq!(signs(&evidence), []);
+        evidence.clipped = Some(vec![0.0, 0.3]);
+        let found = check(&evidence);
+        assert_eq!(found[0].sign, Sign::Saturated);
+        assert!(found[0].evidence.starts_with("`speed`: lies more than 10 deviations"), "{:?}", found[0]);
     }
 
     #[test]

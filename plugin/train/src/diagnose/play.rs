@@ -100,7 +100,12 @@ impl PlayedEpisode {
 
     /// Returns the sum of its rewards.
     pub fn total(&self) -> f64 {
-        self.rewards.iter().map(|reward| f64::from(*reward)).sum()
+        self.earned_until(usize::MAX)
+    }
+
+    /// Returns the sum of its rewards in its first ticks.
+    pub fn earned_until(&self, ticks: usize) -> f64 {
+        self.rewards.iter().take(ticks).map(|reward| f64::from(*reward)).sum()
     }
 
     /// Returns the tick, from 1, of its first positive reward.

@@ -190,12 +190,12 @@ impl RecordedSet {
         (ticks > 0).then(|| idles as f64 / ticks as f64)
     }
 
-    /// Returns the share of the recorded ticks with this discrete action.
-    pub fn share_of(&self, action: u32) -> f64 {
+    /// Returns the share of the recorded ticks with such an action.
+    pub fn share_of(&self, is_taken: impl Fn(&ActionValue) -> bool) -> f64 {
         let (mut ticks, mut found) = (0_u64, 0_u64);
         for taken in self.episodes.iter().flat_map(RecordedEpisode::actions) {
             ticks += 1;
-            found += u64::from(taken == ActionValue::Discrete(action));
+            found += u64::from(is_taken(&taken));
         }
         found as f64 / ticks.max(1) as f64
     }

@@ -16,6 +16,9 @@ const LARGEST_REWARD: f32 = 100.0;
 /// Share of the demonstrator's return that doing nothing must not reach.
 const MOST_FOR_NOTHING: f64 = 0.8;
 
+/// Ticks in which hardly any game gets anywhere.
+const FEW_TICKS: usize = 60;
+
 /// Fewest won episodes, and fewest that were cut off, whose returns are compared.
 const FEWEST_OF_A_KIND: usize = 4;
 
@@ -27,6 +30,11 @@ const RARE: f64 = 0.01;
 
 /// Fewest episodes of the policy that say that it is rare.
 const FEWEST_EPISODES: f64 = 100.0;
+
+/// Fewest rewarded episodes of random actions by which they are said to get there, and the share of what good play earns
+/// that makes a clear difference.
+const FEWEST_OF_CHANCE: usize = 2;
+const CLEARLY_LESS: f64 = 0.1;
 
 /// Present value of a reward under which it does not reach the start of an episode.
 const SMALLEST_VALUE: f64 = 1e-3;
@@ -40,8 +48,10 @@ pub fn check(evidence: &Evidence) -> Vec<LearningFinding> {
     let mut found = Vec::new();
     found.extend(too_short(evidence));
     found.extend(never(evidence));
-    found.extend(rare(evidence));
-    found.extend(idling(evidence).or_else(|| waiting(evidence)));
+    found.extend(below_chance(evidence).or_else(|| rare(evidence)));
+    if !found.iter().any(|finding| finding.sign == Sign::ShortTime) {
+        found.extend(idling(evidence).or_else(|| waiting(evidence)));
+    }
     found.extend(against(evidence));
     found.extend(scale(evidence));
     found.extend(horizon(evidence));
@@ -75,7 +85,7 @@ fn too_short(evidence: &Evidence) -> Option<LearningFinding> {
     let limit = limit(demonstrator).filter(|_| demonstrator.success() == Some(0.0))?;
     let is_paid = demonstrator.ended().any(|episode| episode.first_reward().is_some());
     if is_paid {
-        return None;
+        return gets_nowhere(evidence, limit);
     }
     let recorded = evidence.recordings.iter().flat_map(|set| &set.episodes);
     let wins = recorded.filter(|episode| episode.episode.is_success() || episode.first_reward().is_some());
@@ -93,6 +103,30 @@ fn too_short(evidence: &Evidence) -> Option<LearningFinding> {
         "the time limit is shorter than the path to the goal",
         &[Advice::RaiseTimeLimit],
     ))
+}
+
+/// Finds that all players are cut off in the same tick, with nearly the same return: what they do makes no difference
+/// until then.
+fn gets_nowhere(evidence: &Evidence, limit: usize) -> Option<LearningFinding> {
+    let worth = evidence.played(Seat::Demonstrator).and_then(Played::mean_return)?;
+    let others = || [Seat::Random, Seat::Chaos, Seat::Idle].into_iter().filter_map(|seat| evidence.played(seat));
+    let is_alike = |played: &Played| {
+        let near =
+            played.mean_return().is_some_and(|earned| (earned - worth).abs() <= (1.0 - MOST_FOR_NOTHING) * worth.abs());
+        self::limit(played) == Some(limit) && near
+    };
+    (limit <= FEW_TICKS && others().count() > 1 && others().all(is_alike)).then(|| {
+        LearningFinding::new(
+            Sign::ShortTime,
+            format!(
+                "every episode of every player is cut off after {} ticks, when all have earned nearly the same; returns: {}",
+                whole(limit as f64),
+                returns(evidence)
+            ),
+            "the time limit ends episodes before anybody gets anywhere",
+            &[Advice::RaiseTimeLimit, Advice::PayGoal],
+        )
+    })
 }
 
 fn never(evidence: &Evidence) -> Option<LearningFinding> {
@@ -134,19 +168,59 @@ fn never(evidence: &Evidence) -> Option<LearningFinding> {
     ))
 }
 
+/// Returns what good play earns: the demonstrator's mean return, or that of the recorded wins, or the highest that any
+/// player got in an episode.
+fn worth(evidence: &Evidence) -> Option<(&'static str, f64)> {
+    let demonstrator = evidence.played(Seat::Demonstrator).and_then(Played::mean_return);
+    let wins = evidence.recordings.iter().flat_map(|set| &set.episodes).filter(|episode| episode.episode.is_success());
+    let of_win = |rewards: &[f32]| rewards.iter().map(|reward| f64::from(*reward)).sum::<f64>();
+    let recorded = mean(wins.map(|episode| of_win(&episode.episode.rewards)));
+    let played = evidence.played.iter().flat_map(Played::ended).map(PlayedEpisode::total);
+    let best = played.reduce(f64::max);
+    let known = [("the demonstrator's", demonstrator), ("a recorded win's", recorded), ("the best episode's", best)];
+    known.into_iter().find_map(|(whose, worth)| Some((whose, worth.filter(|worth| *worth > 0.0)?)))
+}
+
+/// Finds that random actions, held or not, reach the goal where the trained policy no longer does.
+fn below_chance(evidence: &Evidence) -> Option<LearningFinding> {
+    let policy = evidence.played(Seat::Policy)?;
+    let own = policy.mean_return()?;
+    let (_, worth) = worth(evidence)?;
+    let chance =
+        [Seat::Random, Seat::Chaos].into_iter().filter_map(|seat| evidence.played(seat)).filter_map(|played| {
+            let wins = played.ended().filter(|episode| episode.success || episode.total() > 0.0).count();
+            Some((played.seat, played.mean_return()?, wins))
+        });
+    let (best, earned, wins) = chance.max_by(|one, other| one.1.total_cmp(&other.1))?;
+    let is_clear = wins >= FEWEST_OF_CHANCE && policy.ended().count() >= FEWEST_OF_A_KIND;
+    (is_clear && earned - own > CLEARLY_LESS * worth && own < CLEARLY_LESS * worth).then(|| {
+        LearningFinding::new(
+            Sign::BelowChance,
+            format!(
+                "{} earn {} and the policy {}; returns: {}",
+                best.name(),
+                readable(earned),
+                readable(own),
+                returns(evidence)
+            ),
+            "the policy has settled on something else before it knew the goal, which chance still reaches",
+            &[Advice::RaiseEntropy, Advice::LowerRate, Advice::UseRecordings],
+        )
+    })
+}
+
 fn rare(evidence: &Evidence) -> Option<LearningFinding> {
     let curves = evidence.curves.as_ref()?;
     let episodes = curves.last(crate::metrics_log::EPISODES).filter(|episodes| *episodes >= FEWEST_EPISODES)?;
     let curve = curves.settled_or_all(crate::metrics_log::EPISODIC_RETURN);
     // Of the last third: a lucky window of the first episodes, of which the won ones end first, says little.
     let best = curve[curve.len() * 2 / 3..].iter().map(|(_, value)| *value).fold(f64::NEG_INFINITY, f64::max);
-    let demonstrator = evidence.played(Seat::Demonstrator)?;
-    let worth = demonstrator.mean_return().filter(|worth| *worth > 0.0)?;
+    let (whose, worth) = worth(evidence)?;
     (best.is_finite() && best < RARE * worth).then(|| {
         LearningFinding::new(
             Sign::RareReward,
             format!(
-                "the best mean return in the last third of {} episodes is {}, under {} of the demonstrator's {}",
+                "the best mean return in the last third of {} episodes is {}, under {} of {whose} {}",
                 whole(episodes),
                 readable(best),
                 percent(RARE),
@@ -343,6 +417,52 @@ mod tests {
     fn a_demonstrator_that_is_always_cut_off_has_too_little_time() {
         let players = [player(Seat::Random, 0.0, CUT), player(Seat::Demonstrator, 0.0, CUT)];
         assert_eq!(signs(&players, "")[0], Sign::ShortTime);
+    }
+
+    #[test]
+    fn nobody_gets_anywhere_before_a_limit_that_is_too_short_for_all() {
+        // All are paid a little for being near, and cut off in the same tick.
+        let near = |seat: Seat, reward: f32| player(seat, reward, CUT);
+        let players =
+            [near(Seat::Random, 0.55), near(Seat::Chaos, 0.54), near(Seat::Idle, 0.55), near(Seat::Demonstrator, 0.57)];
+        assert_eq!(signs(&players, ""), [Sign::ShortTime], "and nobody says that idling pays");
+        let players =
+            [near(Seat::Random, 0.55), near(Seat::Chaos, 0.54), near(Seat::Idle, 0.2), near(Seat::Demonstrator, 0.57)];
+        assert_eq!(signs(&players, ""), [], "idling earns less");
+    }
+
+    #[test]
+    fn a_policy_that_does_worse_than_chance_is_not_said_to_need_luck() {
+        let several = |seat: Seat, wins: usize| {
+            let mut all = player(seat, 0.0, CUT);
+            let (lost, won) = (all.episodes[0].clone(), player(seat, 1.0, WON).episodes[0].clone());
+            all.episodes = [vec![won; wins], vec![lost; 8 - wins]].concat();
+            all
+        };
+        let mut evidence = evidence("ppo", "");
+        let mut curves = crate::runs::RunCurves::default();
+        for update in 1..=9 {
+            let metrics = [(crate::metrics_log::EPISODES, 300.0), (crate::metrics_log::EPISODIC_RETURN, 0.001)];
+            curves.push(1000 * update, metrics.into_iter());
+        }
+        evidence.curves = Some(curves);
+        let mut check_with = |chance: usize| {
+            evidence.played =
+                vec![several(Seat::Chaos, chance), several(Seat::Policy, 0), several(Seat::Demonstrator, 8)];
+            check(&evidence).into_iter().map(|finding| finding.sign).collect::<Vec<_>>()
+        };
+        assert_eq!(check_with(3), [Sign::BelowChance]);
+        assert_eq!(check_with(0), [Sign::RareReward]);
+        // Without a demonstrator a recorded win says what there is to earn.
+        evidence.played = vec![several(Seat::Chaos, 0), several(Seat::Policy, 0)];
+        let mut set = crate::diagnose::testing::recorded(1, true);
+        for episode in &mut set.episodes {
+            std::sync::Arc::make_mut(&mut episode.episode).rewards[19] = 1.0;
+        }
+        evidence.recordings = Some(set);
+        let found = check(&evidence);
+        assert_eq!(found[0].sign, Sign::RareReward);
+        assert!(found[0].evidence.ends_with("a recorded win's 1.000"), "{:?}", found[0]);
     }
 
     #[test]

@@ -19,7 +19,8 @@ pub fn evidence(algorithm: &str, settings: &str) -> Evidence {
     let text = format!(
         r#"(game: "coinrun", train: "hard:0..63", test: "hard:64..127", demos: "d", steps: 1000, algorithm: "{algorithm}", {settings})"#
     );
-    Evidence::new(&parse_experiment(&text, Path::new("x.ron")).expect("valid"), 1)
+    let experiment = parse_experiment(&text, Path::new("x.ron")).expect("valid");
+    Evidence { action_space: ActionSpace::Discrete(3), ..Evidence::new(&experiment, 1) }
 }
 
 /// Returns a player with one unfinished episode. `tick` gives observation, action and reward.
