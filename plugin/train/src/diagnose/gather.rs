@@ -18,8 +18,7 @@ use crate::{
     trainer::TrainedLearner,
 };
 use bevy_playbot::{
-    action::ActionValue, bot::BlindBot, demo::file::DemoFileError, fault::Fault, policy::ActionDraw,
-    skill_prior::SkillPrior,
+    bot::BlindBot, demo::file::DemoFileError, fault::Fault, policy::ActionDraw, skill_prior::SkillPrior,
 };
 use playbot_harness::{
     doctor::{DoctorOptions, examine},
@@ -341,10 +340,10 @@ fn play_all(
         (gathering.progress)("examine the game");
         examine_game(evidence, game);
     }
-    if let Some(Trained { policy, prior, decoder }) = trained.filter(|_| !experiment.observation_config().is_image()) {
+    if let Some(Trained { policy, prior, .. }) = trained.filter(|_| !experiment.observation_config().is_image()) {
         let rows: Vec<&[f32]> =
             evidence.played.iter().flat_map(|played| &played.episodes).flat_map(PlayedEpisode::rows).collect();
-        evidence.networks = probe(policy, decoder.as_ref(), prior.as_ref(), &rows)?;
+        evidence.networks = probe(policy, prior.as_ref(), &rows)?;
         evidence.notes.extend(evidence.networks.as_ref().and_then(skills_in_words));
         let own = evidence.played(Seat::Policy).into_iter().flat_map(|played| &played.episodes);
         evidence.clipped = policy.clipped_shares(own.flat_map(PlayedEpisode::rows));
@@ -449,17 +448,12 @@ fn examine_game(evidence: &mut Evidence, game: &dyn Game) {
     }
 }
 
-/// Compares a skill model with the recordings, or with a demonstrator that has just played the recorded task: that is not
-/// what the model was learned from.
+/// Compares a skill model with the recordings.
 fn decode(evidence: &mut Evidence, skills: Option<&SkillModel>) -> Result<(), DiagnoseError> {
     let (Some(model), Some(set)) = (skills, &evidence.recordings) else { return Ok(()) };
-    let live = evidence.played(Seat::Demonstrator).filter(|_| evidence.other_modes.is_empty());
-    let seen: Vec<(Vec<&[f32]>, Vec<ActionValue>)> = match live {
-        Some(live) => live.episodes.iter().map(|it| (it.rows().collect(), it.actions.clone())).collect(),
-        None => set.seen(),
-    };
+    let seen = set.seen();
     let steps: Vec<_> =
         seen.iter().flat_map(|(rows, actions)| rows.iter().copied().zip(actions.iter().cloned())).collect();
-    evidence.decoder = probe_decoder(model, &steps, live.is_some())?;
+    evidence.decoder = probe_decoder(model, &steps)?;
     Ok(())
 }

@@ -31,15 +31,14 @@ pub struct NetworkProbe {
     pub prior_spread: Option<f64>,
 }
 
-/// Gives a policy observations and skills, and measures what its output depends on. What a skill does is measured on the
-/// decoder, if there is one: training moves the policy away from it. `None` for pictures.
+/// Gives a policy observations and skills, and measures what its output depends on. `None` for
+/// pictures.
 ///
 /// # Errors
 ///
 /// An output is not a number.
 pub fn probe(
     policy: &Policy,
-    decoder: Option<&Policy>,
     prior: Option<&SkillPrior>,
     observations: &[&[f32]],
 ) -> Result<Option<NetworkProbe>, LearnError> {
@@ -63,8 +62,7 @@ pub fn probe(
     found.dead_units = policy.dead_units(&one, flat.as_slice(), count)?;
     found.output_spread = largest_spread(&policy.forward(&one, flat.as_slice(), count)?.head, dim);
     if latent > 0 && draws.len() > 1 {
-        let learned = decoder.unwrap_or(policy);
-        let outputs: Result<Vec<_>, _> = draws.iter().map(|z| learned.forward(z, flat.as_slice(), count)).collect();
+        let outputs: Result<Vec<_>, _> = draws.iter().map(|z| policy.forward(z, flat.as_slice(), count)).collect();
         found.skill_information = Some(information(&outputs?, count));
     }
     if let Some(prior) = prior.filter(|prior| prior.prior.observation().is_some()) {
@@ -77,11 +75,9 @@ pub fn probe(
 /// How well a skill model knows its recordings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DecoderProbe {
-    /// The demonstrator has just played the steps; else they are recorded, and the model may have learned from them.
-    pub is_live: bool,
-    /// Steps that were given.
+    /// Recorded steps that were given.
     pub rows: usize,
-    /// Mean negative log-likelihood of the demonstrated actions under skills of the prior, nats.
+    /// Mean negative log-likelihood of the recorded actions under skills of the prior, nats.
     pub nll: f64,
     /// That of the frequencies of the actions, or of one normal distribution for all states.
     pub frequencies: f64,
@@ -89,16 +85,12 @@ pub struct DecoderProbe {
     pub margin: f64,
 }
 
-/// Gives a skill model demonstrated steps, recorded or played just now. `None` for pictures, or without steps.
+/// Gives a skill model recorded steps. `None` for pictures, or without steps.
 ///
 /// # Errors
 ///
 /// An output is not a number, or an action is not of the model's space.
-pub fn probe_decoder(
-    model: &SkillModel,
-    steps: &[(&[f32], ActionValue)],
-    is_live: bool,
-) -> Result<Option<DecoderProbe>, LearnError> {
+pub fn probe_decoder(model: &SkillModel, steps: &[(&[f32], ActionValue)]) -> Result<Option<DecoderProbe>, LearnError> {
     let ObsKind::Vector(width) = model.observation() else { return Ok(None) };
     let every = steps.len().div_ceil(ROWS).max(1);
     let steps: Vec<_> = steps.iter().step_by(every).filter(|(row, _)| row.len() == width).collect();
@@ -116,13 +108,12 @@ pub fn probe_decoder(
         }
     }
     // The decoder learns the intended actions, and recordings have noise among discrete ones.
-    let has_noise = matches!(space, ActionSpace::Discrete(_)) && !is_live;
-    let noise = if has_noise { model.config().action_noise } else { 0.0 };
+    let noise = if matches!(space, ActionSpace::Discrete(_)) { model.config().action_noise } else { 0.0 };
     let noisy = |likelihood: f64| (1.0 - noise) * likelihood + noise / space.options().max(1) as f64;
     let nll = mean(total.iter().map(|&likelihood| -libm::log(noisy(likelihood).max(1e-30)))).unwrap_or_default();
     let actions: Vec<_> = steps.iter().map(|(_, action)| action).collect();
     let margin = 0.05 * space.choices().sizes().len() as f64 + 0.5 * space.numbers() as f64;
-    Ok(Some(DecoderProbe { is_live, rows: count, nll, frequencies: marginal_entropy(&actions), margin }))
+    Ok(Some(DecoderProbe { rows: count, nll, frequencies: marginal_entropy(&actions), margin }))
 }
 
 /// Returns the entropy of the frequencies of each choice, and of a normal distribution with the mean and deviation of

@@ -48,7 +48,8 @@ pub fn check(evidence: &Evidence) -> Vec<LearningFinding> {
     let mut found = Vec::new();
     found.extend(too_short(evidence));
     found.extend(never(evidence));
-    found.extend(below_chance(evidence).or_else(|| rare(evidence)));
+    // A young policy may do worse than chance for a while: what counts is that it never gets to the reward.
+    found.extend(rare(evidence).map(|rare| below_chance(evidence).unwrap_or(rare)));
     if !found.iter().any(|finding| finding.sign == Sign::ShortTime) {
         found.extend(idling(evidence).or_else(|| waiting(evidence)));
     }
