@@ -6,8 +6,8 @@
 //! that was visited. The policy learns from all states of all rounds. The demonstrator takes a falling share of the
 //! actions ([`ImitationConfig::beta`](playbot_learner::ImitationConfig)).
 //!
-//! After each round the policy is measured on training levels on which nobody is asked. Checkpoints hold the best policy so
-//! far, for everything that reads runs, and the present one, for the resumption.
+//! After each round the policy is measured on training levels on which the demonstrator is not asked. Checkpoints hold
+//! the best policy so far, for everything that reads runs, and the present one, for the resumption.
 //!
 //! ```text
 //! runs/<id>/labels/round-0000.safetensors           the labelled steps of a round

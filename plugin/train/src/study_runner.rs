@@ -208,6 +208,15 @@ struct TrainedRun {
     curves: LearningCurves,
 }
 
+impl TrainedRun {
+    /// Adds what the metrics of a training or imitation of this many steps say.
+    fn with_metrics(dir: RunDir, player: Player, experiment: &Experiment, steps: u64) -> Result<Self, RunsError> {
+        let training = Some(training_result(dir.path(), experiment, steps)?);
+        let curves = learning_curves(dir.path())?;
+        Ok(Self { dir, player, training, curves })
+    }
+}
+
 /// Result of a run; `None` if the observer stopped it.
 type Ended = Option<(StudyResult, LearningCurves)>;
 
@@ -563,7 +572,7 @@ impl<'a> StudyRunner<'a> {
         let (experiment, setup) = (&run.experiment, TrainingSetup { threads, ..self.setup });
         let draw = if experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
         if experiment.algorithm == Algorithm::Imitation {
-            return self.imitate(game, run, run_folder, threads, observer);
+            return self.imitate(game, run, run_folder, (draw, setup), observer);
         }
         let begun = matches!(&run_folder, RunFolder::Begun(dir) if dir.checkpoint(CheckpointChoice::Last).is_ok());
         let skills = match experiment.algorithm.needs_skills() && !begun {
@@ -596,9 +605,7 @@ impl<'a> StudyRunner<'a> {
         }
         let Training { run: dir, trainer, .. } = training;
         let player = Player::Policy { policy: trainer.policy(), prior: trainer.skill_prior(), draw };
-        let training = Some(training_result(dir.path(), experiment, trainer.steps())?);
-        let curves = learning_curves(dir.path())?;
-        Ok(Some(TrainedRun { dir, player, training, curves }))
+        Ok(Some(TrainedRun::with_metrics(dir, player, experiment, trainer.steps())?))
     }
 
     /// Imitates recordings or a demonstrator, without reward: the policy of the best round is the run's.
@@ -607,10 +614,10 @@ impl<'a> StudyRunner<'a> {
         game: &dyn Game,
         run: &StudyRun,
         run_folder: RunFolder,
-        threads: usize,
+        (draw, setup): (ActionDraw, TrainingSetup<'_>),
         observer: &mut dyn RunObserver,
     ) -> Result<Option<TrainedRun>, StudyRunError> {
-        let (experiment, setup) = (&run.experiment, TrainingSetup { threads, ..self.setup });
+        let experiment = &run.experiment;
         let mut imitation = match run_folder {
             RunFolder::Begun(dir) => {
                 let OpenedRun { experiment, info, .. } = RunDir::open(dir.path())?;
@@ -627,11 +634,8 @@ impl<'a> StudyRunner<'a> {
         }
         let steps = imitation.progress().steps;
         let (dir, policy) = imitation.into_best(setup.device)?;
-        let draw = if experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
         let player = Player::Policy { policy, prior: None, draw };
-        let training = Some(training_result(dir.path(), experiment, steps)?);
-        let curves = learning_curves(dir.path())?;
-        Ok(Some(TrainedRun { dir, player, training, curves }))
+        Ok(Some(TrainedRun::with_metrics(dir, player, experiment, steps)?))
     }
 
     /// Returns the skill model of a run, learned once for all runs that share it; `None` if the observer stopped that.

@@ -26,8 +26,8 @@ use std::path::{Path, PathBuf};
 /// from all states of all rounds, and the share of the demonstrator's own actions falls from round to round. Without
 /// --dagger the policy learns from recordings alone.
 ///
-/// After each round the policy is measured on the last training levels, on which the demonstrator is never asked; recordings may show them. Imitation ends after
-/// some rounds without a better result. The run holds the best policy: `eval`, `test` and `policy` take it, and
+/// After each round the policy is measured on the last training levels, on which the demonstrator is never asked;
+/// recordings may show them. Imitation ends after some rounds without a better result. The run holds the best policy: `eval`, `test` and `policy` take it, and
 /// `train --algorithm ppo --from RUN` trains it further.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:

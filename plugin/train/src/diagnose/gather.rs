@@ -233,10 +233,7 @@ pub fn of_recordings(
     }
     if let Some(set) = all {
         evidence.context.demos = Some(set.path.display().to_string());
-        let test = &experiment.test;
-        let is_held_out = |episode: &&RecordedEpisode| {
-            *episode.mode == *test.mode && (test.first..=test.last).contains(&episode.episode.level_seed)
-        };
+        let is_held_out = |it: &&RecordedEpisode| experiment.test.contains(&it.mode, it.episode.level_seed);
         evidence.held_out_recorded = set.episodes.iter().filter(is_held_out).count();
         add_recordings(&mut evidence, game, set, gathering);
     }

@@ -352,7 +352,7 @@ mod tests {
         assert_eq!(signs(&with_rows(|tick| vec![tick as f32 / 100.0, 1.0 - tick as f32 / 50.0])), []);
         let evidence = with_rows(|tick| vec![tick as f32 / 100.0, 3.0]);
         assert_eq!(signs(&evidence), [], "one value may be constant");
-        let note = note_constants(&evidence).expect("it is told");
+        let note = note_constants(&evidence).expect("a note");
         assert_eq!(note, "1 of 2 observed values are the same in all 100 ticks that were played: `speed`");
     }
 

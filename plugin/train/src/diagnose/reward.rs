@@ -426,7 +426,7 @@ mod tests {
         let near = |seat: Seat, reward: f32| player(seat, reward, CUT);
         let players =
             [near(Seat::Random, 0.55), near(Seat::Chaos, 0.54), near(Seat::Idle, 0.55), near(Seat::Demonstrator, 0.57)];
-        assert_eq!(signs(&players, ""), [Sign::ShortTime], "and nobody says that idling pays");
+        assert_eq!(signs(&players, ""), [Sign::ShortTime], "and not that idling pays");
         let players =
             [near(Seat::Random, 0.55), near(Seat::Chaos, 0.54), near(Seat::Idle, 0.2), near(Seat::Demonstrator, 0.57)];
         assert_eq!(signs(&players, ""), [], "idling earns less");
