@@ -11,7 +11,6 @@
 pub(crate) mod experiment;
 pub(crate) mod open;
 pub(crate) mod player;
-pub(crate) mod rival;
 
 use crate::{error::CliError, output::prepare};
 use bevy_playbot::demo::file::{DemoFault, DemoFileError, DemoHeader, DemoWriter};

@@ -4,14 +4,14 @@ use crate::{
     arguments::{Device, experiment::ExperimentArgs, open},
     error::CliError,
     output::print_line,
-    progress,
-    progress::console::report_clipped,
+    progress::{self, console::report_clipped},
 };
 use bevy_playbot::{
     engine::policy_observation,
     policy::ActionDraw,
     policy_file::{PolicyMisfit, check_policy},
     skill_prior::SkillPrior,
+    unknown_name::UnknownName,
     vision::ObservationConfig,
 };
 use playbot_harness::{
@@ -22,6 +22,7 @@ use playbot_harness::{
     game::Game,
     games::Games,
     held_out::HeldOut,
+    rivals::{RivalError, check_rivals, find_seat},
     sensors::GameSensors,
     split::LevelSplit,
 };
@@ -463,12 +464,79 @@ pub(crate) fn seen_by_run(game: &dyn Game, experiment: &Experiment, info: &RunIn
     info.seen.clone().unwrap_or_else(|| experiment.seen_by_training(game))
 }
 
+// Rivals named on the command line: bots, policy files and runs.
+
+/// Options for the player of the other agents of an arena.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub struct RivalArgs {
+    /// Player of the other side, in a game whose agents play together: a bot of the game, a policy file, or the folder of
+    /// a run.
+    #[arg(long, value_name = "RIVAL")]
+    pub rival: Option<String>,
+    /// Seat of the player, by its name (default: all of them, one after the other).
+    #[arg(long, value_name = "NAME", requires = "rival")]
+    pub seat: Option<String>,
+}
+
+impl RivalArgs {
+    /// Loads the rival; `None` if none is named. Policies draw their actions as `draw` says.
+    ///
+    /// # Errors
+    ///
+    /// The game has no rivals, no such bot and no such seat, or the policy was made for another game.
+    pub fn load(
+        &self,
+        game: &dyn Game,
+        mode: &str,
+        draw: ActionDraw,
+        device: DeviceKind,
+    ) -> Result<Option<LoadedPlayer>, CliError> {
+        let Some(name) = &self.rival else { return Ok(None) };
+        check_rivals(game, mode)?;
+        self.seat(game)?;
+        let bots = all_bots(game);
+        let names: Vec<&str> = bots.iter().map(|(name, _)| *name).collect();
+        if names.contains(&name.as_str()) {
+            return Ok(Some(LoadedPlayer::bot(game, name)?));
+        }
+        let path = Path::new(name);
+        let mut rival = if path.is_dir() {
+            let opened = RunDir::open(path)?;
+            check_run_of(path, &opened.experiment.game, game.name())?;
+            LoadedPlayer::run(game, &opened, CheckpointChoice::Last, draw, device)?
+        } else if path.exists() || name.contains(['/', '\\', '.']) {
+            LoadedPlayer::policy_file(game, path, draw, device)?
+        } else {
+            let unknown = UnknownName::new("rival", name, &names);
+            return Err(CliError::Usage(format!("{unknown}; or name a policy file, or the folder of a run")));
+        };
+        rival.check_fit(game)?;
+        if rival.observation_config.is_image() {
+            return Err(CliError::Usage(format!(
+                "{name}: the policy sees pictures, and rivals see vectors: name a policy that reads vectors, or a bot"
+            )));
+        }
+        rival.name = name.clone();
+        Ok(Some(rival))
+    }
+
+    /// Returns the place of the player's seat, if one is named.
+    ///
+    /// # Errors
+    ///
+    /// The game has no such seat.
+    pub fn seat(&self, game: &dyn Game) -> Result<Option<usize>, RivalError> {
+        self.seat.as_deref().map(|name| find_seat(game, name)).transpose()
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::*;
     use bevy::prelude::*;
     use playbot_harness::foreign::{ForeignGame, LevelSeed};
     use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use super::*;
 
     #[test]
     fn levels_are_compared_once_for_all_policies_that_have_seen_the_same() {

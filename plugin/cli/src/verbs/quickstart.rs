@@ -1,8 +1,4 @@
 //! `playbot quickstart`: learn, train, test and report in one command.
-//!
-//! - `report`: the report at its end.
-
-mod report;
 
 use crate::{
     arguments::{
@@ -12,9 +8,8 @@ use crate::{
     },
     error::{CliError, Outcome},
     output::{print_line, program},
-    progress,
-    progress::{console::Console, interrupt},
-    verbs::{learn_skills, quickstart::report::write_report, train::report_length},
+    progress::{self, console::Console, interrupt},
+    verbs::{learn_skills, train::report_length},
 };
 use bevy_playbot::policy::ActionDraw;
 use playbot_harness::{
@@ -26,15 +21,15 @@ use playbot_harness::{
 };
 use playbot_learner::{Dataset, DeviceKind, SeenLevels, SkillModel, disk};
 use playbot_report::{
-    counted,
+    Chart, Curve, Report, ResultRow, ResultTable, Section, Table, counted,
     statistics::{median, steps_to_reach},
-    to_text_table, whole,
+    times, to_text_table, whole,
 };
 use playbot_train::{
     Algorithm, Experiment,
     diagnose::{Diagnosis, of_metrics},
     learn_skills::{behaviour_cloning, learn},
-    metrics_log::SUCCESS_RATE,
+    metrics_log::{SUCCESS_RATE, range_of},
     recordings::read_dataset,
     run_dir::{RunLock, check_replaceable, is_unstarted},
     runs::RunCurves,
@@ -448,6 +443,108 @@ fn headline(methods: &[FirstSuccess], seeds: &[u64], threshold: f64) -> String {
     });
     let seeds = seeds.iter().map(u64::to_string).collect::<Vec<_>>().join(", ");
     format!("{headline} (the medians of seeds {seeds}: {})", by_seed.collect::<Vec<_>>().join("; "))
+}
+
+// The report.
+
+/// Writes the report as one HTML file.
+fn write_report(
+    path: &Path,
+    experiment: &Experiment,
+    trained: &[Trained],
+    rows: &[ResultRow],
+    comparison: &str,
+    seconds: f64,
+) -> Result<(), CliError> {
+    let curve = |value: fn(&CurvePoint) -> f64| -> Vec<Curve> {
+        let points = |one: &Trained| one.curve.iter().map(|point| (point.step as f64, value(point))).collect();
+        trained.iter().map(|one| Curve::new(one.algorithm.name(), points(one))).collect()
+    };
+    let chart = |title: &str, y_label: &str, curves| Chart {
+        title: title.to_owned(),
+        x_label: "environment steps".to_owned(),
+        y_label: y_label.to_owned(),
+        curves,
+        y_range: None,
+        ..Chart::default()
+    };
+    let references = paper_rows(&experiment.game);
+    let orientation = match references.is_empty() {
+        true => "",
+        false => "The paper does not say which unseen levels it used; its figures are shown for orientation. ",
+    };
+    let times = times(experiment.eval.episodes_per_level);
+    let table = ResultTable {
+        caption: format!(
+            "Return per episode on {}, each level {times}, ± one standard error over the levels; steps/s are those of the \
+             training where there was one",
+            experiment.test
+        ),
+        rows: rows.to_vec(),
+        references,
+    };
+    let config = ron::ser::to_string_pretty(experiment, ron::ser::PrettyConfig::default())
+        .map_err(|error| CliError::Io(format!("cannot write the experiment as RON: {error}")))?;
+    let faulty = trained.iter().filter(|one| !one.diagnosis.is_healthy());
+    let why = faulty.map(|one| {
+        let section = one.diagnosis.section();
+        Section { heading: format!("{}: {}", one.algorithm, section.heading), ..section }
+    });
+    let report = Report {
+        title: format!("{}: skills from recordings, tested on unseen levels", experiment.game),
+        subtitle: format!(
+            "{} steps on {}, seed {}, {seconds:.0} seconds on this machine",
+            experiment.steps, experiment.train, experiment.seed
+        ),
+        sections: why
+            .chain([
+                Section {
+                    heading: "Unseen levels".to_owned(),
+                    text: format!(
+                        "{comparison}.\n\n{orientation}A blind player is a baseline that any learner must beat."
+                    ),
+                    tables: vec![Table::Results(table)],
+                    ..Section::default()
+                },
+                Section {
+                    heading: "Learning curves".to_owned(),
+                    text: "Means over the last 100 training episodes.".to_owned(),
+                    charts: vec![
+                        chart("Return on training levels", "return", curve(|point| point.episodic_return)),
+                        Chart {
+                            y_range: range_of(SUCCESS_RATE),
+                            ..chart("Success on training levels", "success rate", curve(|point| point.success_rate))
+                        },
+                    ],
+                    ..Section::default()
+                },
+                Section { heading: "Experiment".to_owned(), code: vec![config], ..Section::default() },
+            ])
+            .collect(),
+    };
+    report.write(path).map_err(|error| CliError::Io(error.to_string()))
+}
+
+/// The game of the paper's measurements.
+const GAME_OF_THE_PAPER: &str = "coinrun";
+
+/// Returns Table 3 of the paper: 64 unseen hard levels, 100,000 steps of evaluation. Empty for other games.
+fn paper_rows(game: &str) -> Vec<ResultRow> {
+    if game != GAME_OF_THE_PAPER {
+        return Vec::new();
+    }
+    let row = |method: &str, return_mean, return_se| ResultRow {
+        method: method.to_owned(),
+        split: "64 unseen hard levels".to_owned(),
+        episodes: 0,
+        return_mean,
+        return_se,
+        level_returns: Vec::new(),
+        success: f64::NAN,
+        length_mean: f64::NAN,
+        steps_per_s: None,
+    };
+    vec![row("SCORE-PPO, paper", 5.32, 0.0), row("PPO, paper", 1.63, 0.03)]
 }
 
 #[cfg(test)]

@@ -16,7 +16,8 @@ use crate::{
     pictures::episode_world::EpisodeStep,
     progress::interrupt::{self, NothingToSave},
     verbs::{
-        replay::{ReplayReport, described, picture, play_again},
+        replay,
+        replay::{ReplayReport, described, last_tick, play_again},
         review::{
             listed::{ListedFinding, list},
             terminal::PictureForm,
@@ -270,7 +271,7 @@ impl Session<'_> {
         match self.form {
             PictureForm::None => Ok(()),
             PictureForm::Text | PictureForm::Auto => print_line(in_characters(game, &finding)?),
-            form => match picture::last_tick(game, &finding, LENGTH)? {
+            form => match last_tick(game, &finding, LENGTH)? {
                 Some(png) => print_picture(&form.show(&png)?.unwrap_or_default()),
                 None => print_line(in_characters(game, &finding)?),
             },
@@ -384,7 +385,7 @@ impl Session<'_> {
 /// The finding cannot be played.
 fn in_characters(game: &dyn Game, finding: &StoredFinding) -> Result<String, CliError> {
     let mut positions = Vec::new();
-    let (steps, _) = picture::play(game, finding, &ObservationConfig::default(), 1, &mut |world, _| {
+    let (steps, _) = replay::play(game, finding, &ObservationConfig::default(), 1, &mut |world, _| {
         positions.extend(world.position(game));
     })?;
     match game.tools().levels.floor_plan(&finding.header.mode, finding.episode.level_seed) {

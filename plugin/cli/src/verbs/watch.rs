@@ -3,8 +3,7 @@
 //! The folder, in reading order:
 //!
 //! - `changes`: files that are saved, and when they are whole.
-//! - `saves`: what was found after each save, on disk and in words.
-//! - `solutions`: the actions that solved each level.
+//! - `saves`: what was found after each save, on disk and in words, and the actions that solved each level.
 //! - `rebuilt`: levels that only another process of the program can test.
 //! - `page`: the page, and the server that shows it.
 
@@ -12,7 +11,6 @@ mod changes;
 mod page;
 mod rebuilt;
 mod saves;
-mod solutions;
 
 use crate::{
     arguments::{Compute, at_least_one_step, default_tested, named_or_only, report_agents_along},
@@ -25,8 +23,7 @@ use crate::{
             changes::{Edited, LevelFiles, Stamp},
             page::Page,
             rebuilt::{LevelLine, Rebuilt, Sources, TestEnd, UnchangedLevel, read_layouts},
-            saves::{LevelState, Save, Saves},
-            solutions::Solutions,
+            saves::{LevelState, Save, Saves, Solutions},
         },
     },
 };

@@ -5,7 +5,7 @@ use crate::{
     error::{CliError, Outcome},
     output::program,
     progress::interrupt,
-    verbs::{demo::deciders, play::Args, skills::names::SkillNames},
+    verbs::{demo::deciders, play::Args, skills::SkillNames},
     window::{Autopilot, GameWindow, Playlist, TeachingSetup, UnboundKeys, WindowSetup},
 };
 use bevy_playbot::{

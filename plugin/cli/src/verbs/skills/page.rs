@@ -6,7 +6,7 @@
 use crate::{
     error::CliError,
     loopback::{Answer, Loopback, Request},
-    verbs::skills::{names::SkillNames, rollouts::Rollout},
+    verbs::skills::{SkillNames, rollouts::Rollout},
 };
 use bevy_playbot::skill_prior::NamedSkill;
 use playbot_report::{PAGE_STYLE, escape::escape};

@@ -7,7 +7,7 @@ use crate::{
         caption::{NumberBars, Reach},
         episode_world::EpisodeWorld,
     },
-    verbs::skills::names::SkillNames,
+    verbs::skills::SkillNames,
 };
 use bevy_playbot::{episode::EpisodeEnd, vision::ObservationConfig};
 use playbot_harness::{eval::Player, game::Game};

@@ -6,7 +6,7 @@ use crate::{
     pictures::episode_world::EpisodeStep,
     progress,
     progress::interrupt,
-    verbs::replay::picture::{film, play, seen_as},
+    verbs::replay::{film, play, seen_as},
 };
 use bevy_playbot::{
     demo::file::DemoEnd,

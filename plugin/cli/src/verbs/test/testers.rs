@@ -6,7 +6,7 @@ use crate::{
         player::{LoadedPlayer, MeasuredLevels, action_draw, check_run_of},
     },
     error::CliError,
-    verbs::{bugs::testers::Named, skills::names::SkillNames},
+    verbs::{bugs::testers::Named, skills::SkillNames},
 };
 use playbot_harness::{game::Game, sealed_file::file_checksum, split::LevelSplit};
 use playbot_learner::DeviceKind;
