@@ -17,6 +17,8 @@ mod planting;
 mod program;
 mod pull_request;
 mod review;
+#[cfg(unix)]
+mod serve;
 mod skills;
 mod switches;
 mod testing;

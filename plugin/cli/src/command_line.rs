@@ -10,8 +10,8 @@ use crate::{
     progress::interrupt,
     verbs::{
         bench, bisect, bugs, completions, config, demo, diagnose, doctor, eval, explore, eyes, history, imitate, init,
-        learn_skills, level, levels, play, policy, quickstart, record, replay, report, review, runs, skills, study,
-        teach, test, trace, train, view, watch,
+        learn_skills, level, levels, play, policy, quickstart, record, replay, report, review, runs, serve, skills,
+        study, teach, test, trace, train, view, watch,
     },
 };
 use bevy_playbot::unknown_name::{nearest, question};
@@ -111,6 +111,7 @@ enum Verb {
     Skills(skills::Args),
     Watch(watch::Args),
     Bench(bench::Args),
+    Serve(serve::Args),
     Bugs(bugs::Args),
     Completions(completions::Args),
 }
@@ -289,6 +290,7 @@ fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
         Verb::Explore(args) => args.compute.threads(),
         Verb::Watch(args) => args.compute.threads(),
         Verb::Bench(args) => args.threads,
+        Verb::Serve(args) => args.threads.count(),
         _ => usable_threads(default_threads()),
     };
     // Networks take no others, wherever they are computed.
@@ -328,6 +330,7 @@ fn run_on_threads(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
         Verb::Skills(args) => skills::run(args, games),
         Verb::Watch(args) => watch::run(&args, games),
         Verb::Bench(args) => bench::run(args, games),
+        Verb::Serve(args) => serve::run(args, games),
         Verb::Bugs(args) => bugs::run(args, games),
         Verb::Completions(args) => completions::run(&args, with_own_name(Cli::command())),
     }

@@ -37,7 +37,7 @@
 //! - [`ForeignGame`] wraps a game as it is. [`Game`] is the contract behind it, for games that want more.
 //! - [`test()`](fn@test) and [`LevelTest`]: assertions for `cargo test`.
 //! - [`main`](main()): the command line. [`check_usage`] checks a command line, [`mod@reference`] describes all verbs.
-//! - [`harness`], [`mod@test`], [`train`], [`mutation`], [`learner`], [`report`]: the crates behind it, for programs
+//! - [`harness`], [`bridge`], [`mod@test`], [`train`], [`mutation`], [`learner`], [`report`]: the crates behind it, for programs
 //!   that call them directly.
 //! - [`pictures`]: steps of an episode as PNGs. `window` (a feature): a window for people.
 //!
@@ -70,6 +70,7 @@ struct Readme;
 
 pub mod prelude;
 
+pub use playbot_bridge as bridge;
 pub use playbot_harness as harness;
 pub use playbot_learner as learner;
 pub use playbot_mutation as mutation;

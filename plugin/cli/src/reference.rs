@@ -5,7 +5,7 @@ use clap::{Arg, Command, CommandFactory};
 use std::fmt::Write;
 
 /// The groups of verbs on the page, in the order of the page.
-const GROUPS: [(&str, &[&str]); 6] = [
+const GROUPS: [(&str, &[&str]); 7] = [
     ("Begin", &["init"]),
     (
         "Test levels",
@@ -30,6 +30,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
             "bench",
         ],
     ),
+    ("Let other programs play", &["serve"]),
     ("Use the shell", &["completions"]),
 ];
 

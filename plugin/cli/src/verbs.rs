@@ -7,6 +7,7 @@
 //! - Record: [`record`], [`demo`].
 //! - Learn: [`quickstart`], [`teach`], [`learn_skills`], [`imitate`], [`train`], [`diagnose`], [`study`], [`eval`],
 //!   [`config`], [`runs`], [`policy`], [`bench`].
+//! - Let other programs play: [`serve`].
 //! - Use the shell: [`completions`].
 //!
 //! A verb reads its options, opens what they name, calls the library, and prints what comes back. Options that several
@@ -39,6 +40,7 @@ pub(crate) mod replay;
 pub(crate) mod report;
 pub(crate) mod review;
 pub(crate) mod runs;
+pub(crate) mod serve;
 pub(crate) mod skills;
 pub(crate) mod study;
 pub(crate) mod teach;

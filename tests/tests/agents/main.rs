@@ -26,6 +26,8 @@ mod recorded_rewards;
 mod recording;
 mod rewards;
 mod rivals;
+#[cfg(unix)]
+mod served;
 mod skills_held;
 mod takeover;
 mod trails;

@@ -15,7 +15,7 @@ use crate::{
     progress::{interrupt, interrupt::NothingToSave},
     verbs::demo::{
         filter::{FilterArgs, filter, label},
-        show::{TickRange, show},
+        show::{Form, TickRange, show},
     },
 };
 use bevy_playbot::{
@@ -80,6 +80,9 @@ enum Verb {
         /// One line of JSON per episode, or per tick.
         #[arg(long)]
         json: bool,
+        /// Each episode has its game, mode, actions and rewards, too, for programs that play it again.
+        #[arg(long, requires = "json", conflicts_with = "episode")]
+        actions: bool,
     },
     /// Replay recordings. Exit code 1 if one diverges, is damaged or cannot be replayed.
     ///
@@ -146,7 +149,14 @@ enum Verb {
 pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     match args.verb {
         Verb::Ls { paths, json } => ls(&paths, json),
-        Verb::Show { file, episode, ticks, json } => show(&file, episode, ticks, json, games),
+        Verb::Show { file, episode, ticks, json, actions } => {
+            let form = match (json, actions) {
+                (false, _) => Form::Words,
+                (true, false) => Form::Json,
+                (true, true) => Form::JsonWithActions,
+            };
+            show(&file, episode, ticks, form, games)
+        }
         Verb::Verify { paths, json } => verify(&paths, json, games),
         Verb::Repair { file, out, header_from, json } => {
             mend(&file, out.as_deref().unwrap_or(&file), header_from.as_deref(), json)

@@ -16,6 +16,15 @@ use playbot_report::counted;
 use serde_json::{Value, json};
 use std::{collections::BTreeMap, path::Path, str::FromStr};
 
+/// What is printed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Form {
+    Words,
+    Json,
+    /// JSON of whole episodes, for programs that play them again.
+    JsonWithActions,
+}
+
 /// Ticks of an episode, both included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct TickRange {
@@ -45,19 +54,19 @@ pub(super) fn show(
     file: &Path,
     wanted: Option<usize>,
     ticks: Option<TickRange>,
-    as_json: bool,
+    form: Form,
     games: &Games,
 ) -> Result<Outcome, CliError> {
     let reader = DemoReader::open(file).map_err(open::missing_recording)?;
-    let names = action_names(reader.header(), games);
-    if !as_json {
-        show_header(reader.header())?;
+    let (header, names) = (reader.header().clone(), action_names(reader.header(), games));
+    if form == Form::Words {
+        show_header(&header)?;
     }
     let mut episodes = 0;
     for episode in reader {
         let episode = episode?;
         match wanted {
-            None => show_episode(episodes, &episode, as_json)?,
+            None => show_episode(&header, episodes, &episode, form)?,
             Some(wanted) if wanted == episodes => {
                 let ticks = ticks.unwrap_or(TickRange { first: 0, last: usize::MAX });
                 if ticks.first >= episode.len() && !episode.is_empty() {
@@ -68,7 +77,7 @@ pub(super) fn show(
                         counted(episode.len() as u64, "tick")
                     )));
                 }
-                show_ticks(&episode, ticks, &names, as_json)?;
+                show_ticks(&episode, ticks, &names, form != Form::Words)?;
                 return Ok(Outcome::Pass);
             }
             Some(_) => {}
@@ -82,6 +91,15 @@ pub(super) fn show(
             counted(episodes as u64, "episode")
         ))),
         None => Ok(Outcome::Pass),
+    }
+}
+
+/// Returns the action of a tick as JSON.
+fn action(actions: &Actions, tick: usize) -> Value {
+    match actions {
+        Actions::Discrete(list) => json!(list[tick]),
+        Actions::Continuous { .. } => json!(actions.vector(tick)),
+        Actions::Mixed { .. } => json!({ "choices": actions.chosen(tick), "numbers": actions.vector(tick) }),
     }
 }
 
@@ -131,14 +149,20 @@ fn observations(header: &DemoHeader) -> String {
     output::with_names(&values, &header.observation_names)
 }
 
-fn show_episode(index: usize, episode: &DemoEpisode, as_json: bool) -> Result<(), CliError> {
-    if as_json {
+fn show_episode(header: &DemoHeader, index: usize, episode: &DemoEpisode, form: Form) -> Result<(), CliError> {
+    if form != Form::Words {
         let mut line = json!({
             "episode": index, "level": episode.level_seed, "level_file": episode.level_file.as_ref().map(level_file), "steps": episode.len(),
             "return": episode.episode_return(), "end": episode.end, "steps_by_decider": episode.steps_by_decider(),
         });
         if !episode.randomised.is_empty() {
             line["randomised"] = json!(episode.randomised);
+        }
+        if form == Form::JsonWithActions {
+            line["game"] = json!(header.game);
+            line["mode"] = json!(header.mode);
+            line["actions"] = (0..episode.len()).map(|tick| action(&episode.actions, tick)).collect();
+            line["rewards"] = json!(episode.rewards);
         }
         return print_line(line);
     }
@@ -186,16 +210,12 @@ fn show_ticks(episode: &DemoEpisode, ticks: TickRange, names: &[String], as_json
     for (tick, words) in shown.zip(words) {
         let (reward, hash, decider) = (episode.rewards[tick], episode.state_hashes[tick], episode.deciders[tick]);
         if as_json {
-            let (action, name) = match &episode.actions {
-                Actions::Discrete(list) => (json!(list[tick]), names.get(list[tick] as usize)),
-                Actions::Continuous { .. } => (json!(episode.actions.vector(tick)), None),
-                Actions::Mixed { .. } => {
-                    let (choices, numbers) = (episode.actions.chosen(tick), episode.actions.vector(tick));
-                    (json!({"choices": choices, "numbers": numbers}), None)
-                }
+            let name = match &episode.actions {
+                Actions::Discrete(list) => names.get(list[tick] as usize),
+                Actions::Continuous { .. } | Actions::Mixed { .. } => None,
             };
             let mut row = json!({
-                "tick": tick, "action": action, "reward": reward, "state_hash": hash, "decider": decider,
+                "tick": tick, "action": action(&episode.actions, tick), "reward": reward, "state_hash": hash, "decider": decider,
             });
             if let Some(name) = name {
                 row["action_name"] = json!(name);

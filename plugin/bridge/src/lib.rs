@@ -1,0 +1,13 @@
+//! Programs in other languages play Bevy games: the protocol, the arrays and the Worlds that step together.
+//!
+//! In reading order:
+//!
+//! - [`arrays`]: the arrays of a step, and the memory that both sides read and write.
+//! - [`messages`]: the messages of the protocol.
+//! - [`lockstep`]: Worlds whose agents all wait for their next actions.
+//! - [`server`]: a conversation with one client.
+
+pub mod arrays;
+pub mod lockstep;
+pub mod messages;
+pub mod server;
