@@ -372,7 +372,9 @@ impl SharedFile {
             }
         };
         let refused = |source| MemoryError { path: path.clone(), bytes, source };
-        let shared = Self { file: opened.map_err(refused)?, path: Mutex::new(Some(path.clone())) };
+        let file = opened.map_err(refused)?;
+        let shown = Some(nameless(&file, &path).unwrap_or_else(|| path.clone()));
+        let shared = Self { file, path: Mutex::new(shown) };
         let head = [
             protocol,
             layout.checksum(),
@@ -399,11 +401,21 @@ impl SharedFile {
     }
 
     fn unlink(&self) {
-        if let Some(path) = lock(&self.path).take() {
+        // A file without a name has none to lose.
+        if let Some(path) = lock(&self.path).take().filter(|path| !path.starts_with("/proc")) {
             // Somebody else may have removed it.
             let _ = disk::remove_file(&path);
         }
     }
+}
+
+/// Takes the name of a new file away, and returns the path by which it can be opened all the same, through this process. So
+/// nothing is left of it even if the process is killed. `None` where there is no such path: the file keeps its name.
+#[cfg(unix)]
+fn nameless(file: &DiskFile, path: &Path) -> Option<PathBuf> {
+    use std::os::fd::AsRawFd;
+    let shown = PathBuf::from(format!("/proc/{}/fd/{}", std::process::id(), file.as_file().as_raw_fd()));
+    (shown.exists() && disk::remove_file(path).is_ok()).then_some(shown)
 }
 
 #[cfg(unix)]
@@ -480,12 +492,19 @@ mod tests {
         let at = HEAD + memory.layout.action_bytes + memory.layout.result_bytes + second;
         assert_eq!(fs::read(&path).expect("readable")[at..at + 4], 1.5_f32.to_le_bytes());
         memory.forget_path();
-        assert!(!path.exists() && memory.path().is_none());
+        assert!(memory.path().is_none() && names_in(folder.path()).is_empty());
         memory.write(0, 0, &[1]).expect("still open");
         let other = SharedFile::new_in(folder.path(), &layout(), 7).expect("room");
-        let path = lock(&other.path).clone().expect("a path");
+        if cfg!(target_os = "linux") {
+            assert_eq!(names_in(folder.path()), Vec::<String>::new(), "not even while it is used");
+        }
         drop(other);
-        assert!(!path.exists());
+        assert!(names_in(folder.path()).is_empty());
+    }
+
+    fn names_in(folder: &Path) -> Vec<String> {
+        let names = fs::read_dir(folder).expect("a folder").flatten();
+        names.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect()
     }
 
     #[cfg(unix)]

@@ -28,6 +28,7 @@ use bevy_playbot::{
 use playbot_harness::{
     game::{Game, level_designs},
     level_files::is_level_files,
+    machine::{MemoryError, check_bytes},
     prelude::*,
     split::last_level,
     worlds::Arrangement,
@@ -42,6 +43,7 @@ use std::{
         mpsc::{Receiver, RecvError, Sender, TryRecvError, channel},
     },
     thread,
+    time::{Duration, Instant},
 };
 use thiserror::Error;
 
@@ -103,6 +105,19 @@ impl Settings<'_> {
     /// Returns the agents that share an arena.
     pub fn agents_per_arena(&self) -> usize {
         self.game.tools().host.agents_per_arena().max(1) as usize
+    }
+
+    /// Checks that the arrays and the Worlds fit into the memory that is free.
+    ///
+    /// # Errors
+    ///
+    /// They do not: with the options to lower.
+    pub fn check_memory(&self) -> Result<(), MemoryError> {
+        let agents = self.arrangement().total();
+        let what = format!("the arrays of {agents} agents that see {}", self.observation);
+        // What an agent sees is in its World, too.
+        let bytes = (self.layout().bytes() as u64).saturating_mul(2);
+        check_bytes(what, bytes, "`--arenas`, `--size` or `--stack`", self.arrangement())
     }
 
     /// Returns where the arrays of all agents lie.
@@ -350,6 +365,15 @@ impl Lockstep {
         Ok(())
     }
 
+    /// Checks that episodes have begun.
+    ///
+    /// # Errors
+    ///
+    /// They have not.
+    pub fn check_begun(&self) -> Result<(), StepError> {
+        if self.has_begun { Ok(()) } else { Err(StepError::Refused(not_begun())) }
+    }
+
     /// Returns the number of Worlds.
     pub fn worlds(&self) -> usize {
         self.worlds.len()
@@ -414,9 +438,7 @@ impl Lockstep {
     ///
     /// An action is none of the game's.
     pub fn begin_step(&mut self) -> Result<(), StepError> {
-        if !self.has_begun {
-            return Err(StepError::Refused(not_begun()));
-        }
+        self.check_begun()?;
         let bytes = self.memory.actions().map_err(|error| StepError::Failed(error.to_string()))?;
         let actions = read_actions(self.memory.layout(), &self.plan.space, &bytes)
             .map_err(|(agent, why)| StepError::Refused(Refusal::of_arena(agent / self.plan.per_arena, why)))?;
@@ -481,8 +503,7 @@ impl Lockstep {
         &mut self,
         work: impl Fn(usize, &mut World, &[Entity]) -> T + Clone + Send + 'static,
     ) -> Result<Vec<Awaited<T>>, StepError> {
-        // An arena that there is: episodes have begun.
-        self.place(0)?;
+        self.check_begun()?;
         let worlds = 0..self.worlds.len();
         let call = |world| {
             let work = work.clone();
@@ -557,9 +578,7 @@ impl Lockstep {
         if arena >= self.plan.agents / per_arena {
             return Err(StepError::Refused(no_arena(arena, self.plan.agents / per_arena)));
         }
-        if !self.has_begun {
-            return Err(StepError::Refused(not_begun()));
-        }
+        self.check_begun()?;
         let agent = arena * per_arena;
         Ok((agent / each, agent % each))
     }
@@ -632,21 +651,50 @@ impl Plan {
     }
 }
 
-/// Receives, awake at first: most messages come soon, and it takes the system longer to wake a thread than to switch to one
-/// that is awake.
+/// Receives, awake at first.
 fn awake<T>(messages: &Receiver<T>) -> Result<T, RecvError> {
-    for _ in 0..AWAKE {
-        match messages.try_recv() {
-            Ok(message) => return Ok(message),
-            Err(TryRecvError::Disconnected) => return Err(RecvError),
-            Err(TryRecvError::Empty) => thread::yield_now(),
-        }
-    }
-    messages.recv()
+    let looked = look_awake(|| match messages.try_recv() {
+        Err(TryRecvError::Empty) => None,
+        Ok(message) => Some(Ok(message)),
+        Err(TryRecvError::Disconnected) => Some(Err(RecvError)),
+    });
+    looked.unwrap_or_else(|| messages.recv())
 }
 
-/// Looks for a message before a thread sleeps: about a tenth of a millisecond.
-const AWAKE: u32 = 200;
+/// Looks for something for about a tenth of a millisecond, before the thread sleeps until it comes. Most things come soon,
+/// and it takes the system longer to wake a thread than to switch to one that is awake.
+///
+/// Where other programs want the processors, to let them pass takes milliseconds each time, and a thread that sleeps is
+/// served sooner. Then the next waits do not look.
+pub(crate) fn look_awake<T>(mut look: impl FnMut() -> Option<T>) -> Option<T> {
+    static CROWDED: AtomicUsize = AtomicUsize::new(0);
+    let crowded = CROWDED.load(Ordering::Relaxed);
+    if crowded > 0 {
+        CROWDED.store(crowded - 1, Ordering::Relaxed);
+        return look();
+    }
+    for _ in 0..LOOKS {
+        if let Some(found) = look() {
+            return Some(found);
+        }
+        let before = Instant::now();
+        thread::yield_now();
+        if before.elapsed() > LONG {
+            CROWDED.store(ASLEEP, Ordering::Relaxed);
+            return look();
+        }
+    }
+    None
+}
+
+/// Looks before a thread sleeps.
+const LOOKS: u32 = 150;
+
+/// Time after which a processor counts as wanted by others.
+const LONG: Duration = Duration::from_micros(300);
+
+/// Waits without looks after that.
+const ASLEEP: usize = 500;
 
 fn not_begun() -> Refusal {
     Refusal::new("no episode has begun: send a reset first")

@@ -2,7 +2,7 @@
 
 use crate::{
     arrays::{Layout, Memory},
-    lockstep::{Awaited, Leader, Lockstep, SavedEpisode, Settings, StepError, led_by},
+    lockstep::{Awaited, Leader, Lockstep, SavedEpisode, Settings, StepError, led_by, look_awake},
     messages::{Call, Hello, Kind, MOST_JSON, PROTOCOL, Refusal, Reset, read, write, write_json},
 };
 use bevy::prelude::World;
@@ -223,34 +223,26 @@ impl Write for Stream {
     }
 }
 
-/// A stream that is waited for awake at first, since most messages come soon, and it takes the system longer to wake a thread
-/// than to switch to one that is awake.
+/// A stream that is waited for [awake](look_awake) at first.
 struct Awake<'a>(&'a mut Stream);
-
-/// Looks for a message before the thread sleeps: about a tenth of a millisecond.
-const AWAKE: u32 = 100;
 
 impl Read for Awake<'_> {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         self.0.set_nonblocking(true)?;
-        let mut got = Err(ErrorKind::WouldBlock.into());
-        for _ in 0..AWAKE {
-            got = self.0.read(bytes);
-            if !got.as_ref().is_err_and(|error: &io::Error| error.kind() == ErrorKind::WouldBlock) {
-                break;
-            }
-            thread::yield_now();
-        }
+        let got = look_awake(|| match self.0.read(bytes) {
+            Err(error) if error.kind() == ErrorKind::WouldBlock => None,
+            got => Some(got),
+        });
         self.0.set_nonblocking(false)?;
-        match got {
-            Err(error) if error.kind() == ErrorKind::WouldBlock => self.0.read(bytes),
-            got => got,
-        }
+        got.unwrap_or_else(|| self.0.read(bytes))
     }
 }
 
 /// Time between two looks for a client, or for a request to stop.
 const LOOK: Duration = Duration::from_millis(20);
+
+/// Looks for which a second client waits for the end of the first one: it may be leaving.
+const PATIENCE: u32 = 25;
 
 /// Looks for the only client, about a minute: whoever has started the server for it is gone.
 const LOOKS: u32 = 3000;
@@ -276,9 +268,9 @@ impl Server<'_> {
     ///
     /// No client can be heard any more.
     pub fn run(&self, listener: &Listener) -> io::Result<()> {
-        let mut looks = 0;
+        let (mut looks, mut early) = (0, None);
         while !(self.stops)() {
-            let Some(stream) = listener.client()? else {
+            let Some(stream) = early.take().map_or_else(|| listener.client(), |stream| Ok(Some(stream)))? else {
                 thread::park_timeout(LOOK);
                 looks += 1;
                 if self.once && looks > LOOKS {
@@ -290,9 +282,10 @@ impl Server<'_> {
             let other = stream.try_clone().ok();
             let over = AtomicBool::new(false);
             let ended = thread::scope(|scope| {
-                scope.spawn(|| self.watch(listener, other.as_ref(), &over));
+                let watching = scope.spawn(|| self.watch(listener, other.as_ref(), &over));
                 let ended = self.converse(stream);
                 over.store(true, Ordering::Release);
+                early = watching.join().unwrap_or_default();
                 ended
             });
             (self.report)(&ended);
@@ -303,13 +296,24 @@ impl Server<'_> {
         Ok(())
     }
 
-    /// Refuses other clients, and ends the conversation if it has to stop.
-    fn watch(&self, listener: &Listener, stream: Option<&Stream>, over: &AtomicBool) {
+    /// Refuses other clients, and ends the conversation if it has to stop. Returns a client that has come just before the
+    /// end, which is the next one.
+    fn watch(&self, listener: &Listener, stream: Option<&Stream>, over: &AtomicBool) -> Option<Stream> {
+        let mut second: Option<(Stream, u32)> = None;
         while !over.load(Ordering::Acquire) {
             if (self.stops)() {
                 stream.inspect(|stream| stream.close());
             }
-            if let Ok(Some(mut second)) = listener.client() {
+            if second.is_none() {
+                second = listener.client().ok().flatten().map(|stream| (stream, 0));
+            }
+            let waited = second.as_mut().map_or(0, |(_, looks)| {
+                *looks += 1;
+                *looks
+            });
+            if waited > PATIENCE
+                && let Some((mut second, _)) = second.take()
+            {
                 let words = "another client is connected, and a server has one at a time: start a server of your own";
                 // It may be gone again.
                 let _ = write_json(&mut second, Kind::Error, &Refusal::fatal(words));
@@ -317,6 +321,7 @@ impl Server<'_> {
             }
             thread::park_timeout(LOOK);
         }
+        second.map(|(stream, _)| stream)
     }
 
     /// Talks with a client until it leaves, and returns how that went, in words.
@@ -605,6 +610,7 @@ impl Conversation {
     /// Begins to record all Worlds, a file each.
     fn record(&self, folder: &Path, worlds: &mut Lockstep) -> Result<Pending, StepError> {
         let failed = |path: &Path, why: String| refused(format!("{}: {why}", path.display()));
+        worlds.check_begun()?;
         disk::create_dir_all(folder).map_err(|error| failed(folder, error.to_string()))?;
         let path = |world| folder.join(format!("world-{world:03}.demo"));
         let files: Vec<PathBuf> = (0..worlds.worlds()).map(path).collect();

@@ -193,6 +193,43 @@ def test_what_is_not_there_is_named():
         Client(address="/no/such/socket")
 
 
+def test_wrong_options_are_named_before_a_program_is_started():
+    with pytest.raises(TypeError, match="did you mean 'levels'"):
+        playbot.make("coinrun", levles=EASY)
+    with pytest.raises(TypeError, match="names a mode"):
+        playbot.make("coinrun", mode="hard")
+    with pytest.raises(ValueError, match="there are next_step, same_step, disabled"):
+        playbot.make_vec("coinrun", autoreset="never")
+    env = playbot.make("coinrun", levels=EASY)
+    with pytest.raises(ValueError, match="reset has no options"):
+        env.reset(options={"levle": 7})
+    env.close()
+    env.close()
+
+
+def test_each_arena_may_have_a_seed_of_its_own():
+    envs = playbot.make_vec("coinrun", num_envs=3, levels=EASY)
+    levels = [envs.reset(seed=seeds)[1]["level"] for seeds in ([1, 2, 3], [1, 5, 3])]
+    assert levels[0][0] == levels[1][0] and levels[0][2] == levels[1][2] and levels[0][1] != levels[1][1]
+    with pytest.raises(ValueError, match="2 seeds for 3 arenas"):
+        envs.reset(seed=[1, 2])
+    envs.close()
+
+
+def test_a_server_that_is_there_already_serves_an_environment(tmp_path):
+    words = [os.environ["PLAYBOT_PROGRAM"], "serve", "coinrun", "--arenas", "2", "--listen", str(tmp_path / "socket")]
+    server = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    server.stdout.readline()
+    address = str(tmp_path / "socket")
+    with pytest.raises(ValueError, match="serves {'arenas': 2, 'autoreset': 'next_step'}"):
+        playbot.make(address=address)
+    envs = playbot.make_vec(address=address, num_envs=2)
+    assert envs.reset()[0].shape[0] == 2
+    envs.close()
+    server.terminate()
+    assert server.wait() == 143
+
+
 def left_behind():
     return glob.glob("/dev/shm/playbot-*")
 

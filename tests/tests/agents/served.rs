@@ -8,7 +8,7 @@ use std::{
     thread,
 };
 
-use bevy_playbot::vision::ObservationConfig;
+use bevy_playbot::vision::{ImageOptions, ObservationConfig, ObservationKind};
 use playbot::harness::prelude::*;
 use playbot_bridge::{
     arrays::{Layout, Memory},
@@ -122,7 +122,6 @@ fn the_same_step_shows_the_next_episode_and_the_last_observation() {
         assert_eq!(played.numbers("final_observations"), [1.0, 0.15]);
         played.step(&[2]);
         assert_eq!((played.first().1, played.first().3), (RUNS, 1));
-        assert_eq!(played.numbers("final_observations"), [0.0, 0.0]);
     });
 }
 
@@ -353,6 +352,11 @@ fn a_conversation_over_a_socket() {
             assert!(refused["error"].as_str().is_some_and(|error| error.contains(words)), "{refused}");
             assert_eq!(refused["fatal"], false);
         }
+        let folder = tempfile::tempdir().expect("a folder");
+        write_json(stream, Kind::Call, &json!({ "call": "record", "folder": folder.path().join("a/b") }))
+            .expect("it is there");
+        let files = json_of(stream, Kind::Answer)["files"].as_array().map_or(0, Vec::len);
+        assert_eq!(files, 2, "one for each World");
         write(stream, Kind::State, &[]).expect("it is there");
         assert!(refusal(stream)["error"].as_str().is_some_and(|error| error.contains("of kind 10")));
         write_json(stream, Kind::Call, &json!({ "call": "hash", "arena": 0 })).expect("it is there");
@@ -373,14 +377,30 @@ fn shared_memory_is_gone_once_the_client_has_it() {
         );
         write_json(stream, Kind::Call, &json!({ "call": "mapped" })).expect("it is there");
         assert_eq!(json_of(stream, Kind::Answer), json!({}));
-        assert!(!path.exists());
+        assert!(left_in_memory().is_empty());
     });
-    let mut left = None;
     served(true, |_, stream| {
         // It leaves before it has opened the memory.
-        left = greet(stream)["memory"]["path"].as_str().map(str::to_owned);
+        greet(stream);
     });
-    assert!(!Path::new(&left.expect("a path")).exists());
+    assert!(left_in_memory().is_empty());
+}
+
+/// Returns the names of shared memory of this process.
+fn left_in_memory() -> Vec<String> {
+    let own = format!("playbot-{}-", std::process::id());
+    let names = std::fs::read_dir("/dev/shm").into_iter().flatten().flatten();
+    names.map(|entry| entry.file_name().to_string_lossy().into_owned()).filter(|name| name.starts_with(&own)).collect()
+}
+
+#[test]
+fn more_than_fits_into_memory_is_refused_before_anything_is_written() {
+    let image = ImageOptions { width: 1024, height: 1024, stack: 16, ..ImageOptions::default() };
+    let observation = ObservationConfig { kind: ObservationKind::Raster, image };
+    let many = Settings { observation, ..settings(65_536, 1, Autoreset::NextStep) };
+    let words = many.check_memory().expect_err("terabytes").to_string();
+    assert!(words.contains("65536 agents that see 1024×1024") && words.contains("lower `--arenas`"), "{words}");
+    settings(64, 2, Autoreset::NextStep).check_memory().expect("a few kilobytes");
 }
 
 #[test]

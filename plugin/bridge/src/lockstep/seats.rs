@@ -2,7 +2,8 @@
 
 use crate::{
     arrays::{
-        FINAL_OBSERVATIONS, LEGAL, LEVEL, Memory, Number, OBSERVATIONS, REWARDS, SUCCESS, TERMINATED, TICK, TRUNCATED,
+        Array, FINAL_OBSERVATIONS, LEGAL, LEVEL, Memory, Number, OBSERVATIONS, REWARDS, SUCCESS, TERMINATED, TICK,
+        TRUNCATED,
     },
     lockstep::{Autoreset, Begin, Leader, Lockstep, Order, Replies, Reply, SavedEpisode, Settings, awake},
 };
@@ -14,6 +15,7 @@ use bevy_playbot::{
 use playbot_harness::{prelude::*, worlds::build_observing_world};
 use std::{
     collections::VecDeque,
+    io,
     ops::Range,
     sync::{Arc, Mutex, PoisonError, mpsc::Receiver},
 };
@@ -423,37 +425,57 @@ impl Seats {
 
     /// Writes the rows of this World's agents into each array.
     fn write(&self, world: &World) -> Reply {
-        let layout = self.line.memory.layout();
-        let seen: Vec<&Observation> =
-            self.agents.iter().zip(&self.rows).map(|(&agent, row)| row.seen(world, agent)).collect();
-        let nothing = Observation::default();
-        let episodes = self.agents.iter().zip(&self.rows).map(|(&agent, row)| match world.get::<Episode>(agent) {
-            Some(episode) if !row.stage.is_held() => (episode.level, episode.tick),
-            _ => row.ended,
-        });
-        let (levels, ticks): (Vec<u64>, Vec<u32>) = episodes.unzip();
-        for array in &layout.results {
-            let of_rows =
-                |value: fn(&Row) -> bool| self.rows.iter().map(|row| u8::from(value(row))).collect::<Vec<u8>>();
-            let bytes = match array.name {
-                OBSERVATIONS => flat(&seen, array.dtype, array.row()),
-                FINAL_OBSERVATIONS => {
-                    let last = self.rows.iter().map(|row| row.last.as_ref().unwrap_or(&nothing));
-                    flat(&last.collect::<Vec<_>>(), array.dtype, array.row())
+        let written = self.line.memory.layout().results.iter().try_for_each(|array| self.write_array(world, array));
+        written.map_err(|error| format!("the results cannot be written into shared memory: {error}"))
+    }
+
+    fn write_array(&self, world: &World, array: &Array) -> io::Result<()> {
+        let (Line { memory, slot, .. }, first, width) = (&self.line, self.first, array.row());
+        let rows = || self.agents.iter().copied().zip(&self.rows);
+        let put = |row: usize, bytes: &[u8]| memory.write(*slot, array.offset + (first + row) * width, bytes);
+        let put_flags =
+            |flag: fn(&Row) -> bool| put(0, &rows().map(|(_, row)| u8::from(flag(row))).collect::<Vec<u8>>());
+        match array.name {
+            // Pictures are large, so they are copied once.
+            OBSERVATIONS if array.dtype == Number::U8 => rows().enumerate().try_for_each(|(at, (agent, row))| {
+                put(at, fitting(bytes_of(row.seen(world, agent), array.dtype), width))
+            }),
+            OBSERVATIONS => {
+                let mut bytes = Vec::with_capacity(width * self.rows.len());
+                for (number, (agent, row)) in (1..).zip(rows()) {
+                    bytes.extend_from_slice(bytes_of(row.seen(world, agent), array.dtype));
+                    // An observation of another length is a fault of the game, which is reported after the tick.
+                    bytes.resize(number * width, 0);
                 }
-                REWARDS => self.rows.iter().flat_map(|row| row.reward.to_le_bytes()).collect(),
-                TERMINATED => of_rows(|row| matches!(row.end, Some(EpisodeEnd::Terminated { .. }))),
-                TRUNCATED => of_rows(|row| row.end == Some(EpisodeEnd::Truncated)),
-                SUCCESS => of_rows(|row| row.end.is_some() && row.success),
-                LEVEL => levels.iter().flat_map(|level| level.to_le_bytes()).collect(),
-                TICK => ticks.iter().flat_map(|tick| tick.to_le_bytes()).collect(),
-                LEGAL => self.agents.iter().flat_map(|&agent| legal(world, agent, array.row())).collect(),
-                _ => Vec::new(),
-            };
-            let written = self.line.memory.write(self.line.slot, array.offset + self.first * array.row(), &bytes);
-            written.map_err(|error| format!("the results cannot be written into shared memory: {error}"))?;
+                put(0, &bytes)
+            }
+            // The other rows mean nothing.
+            FINAL_OBSERVATIONS => rows().enumerate().try_for_each(|(at, (_, row))| match &row.last {
+                Some(last) => put(at, fitting(bytes_of(last, array.dtype), width)),
+                None => Ok(()),
+            }),
+            REWARDS => put(0, &rows().flat_map(|(_, row)| row.reward.to_le_bytes()).collect::<Vec<u8>>()),
+            TERMINATED => put_flags(|row| matches!(row.end, Some(EpisodeEnd::Terminated { .. }))),
+            TRUNCATED => put_flags(|row| row.end == Some(EpisodeEnd::Truncated)),
+            SUCCESS => put_flags(|row| row.end.is_some() && row.success),
+            LEVEL => {
+                put(0, &rows().flat_map(|(agent, row)| row.place(world, agent).0.to_le_bytes()).collect::<Vec<u8>>())
+            }
+            TICK => {
+                put(0, &rows().flat_map(|(agent, row)| row.place(world, agent).1.to_le_bytes()).collect::<Vec<u8>>())
+            }
+            LEGAL => {
+                let mut bytes = vec![1; width * self.rows.len()];
+                for (mask, &agent) in bytes.chunks_exact_mut(width).zip(&self.agents) {
+                    let legal = (world.get::<LegalActions>(agent), world.get::<Agent>(agent));
+                    if let (Some(legal), Some(Agent { actions, .. })) = legal {
+                        mask.iter_mut().zip(legal.entries(actions)).for_each(|(to, is_legal)| *to = u8::from(is_legal));
+                    }
+                }
+                put(0, &bytes)
+            }
+            _ => Ok(()),
         }
-        Ok(())
     }
 }
 
@@ -471,6 +493,14 @@ impl Row {
         *self = Self { stage, queue, ..Self::default() };
     }
 
+    /// Returns level and tick of the episode that the caller sees.
+    fn place(&self, world: &World, agent: Entity) -> (u64, u32) {
+        match world.get::<Episode>(agent) {
+            Some(episode) if !self.stage.is_held() => (episode.level, episode.tick),
+            _ => self.ended,
+        }
+    }
+
     /// Returns what the caller sees of the agent.
     fn seen<'a>(&'a self, world: &'a World, agent: Entity) -> &'a Observation {
         static NOTHING: Observation = Observation { vector: Vec::new(), image: Vec::new() };
@@ -479,24 +509,16 @@ impl Row {
     }
 }
 
-/// Returns observations as bytes, one after the other, each of `row` bytes.
-fn flat(seen: &[&Observation], dtype: Number, row: usize) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(row * seen.len());
-    for (number, observation) in (1..).zip(seen) {
-        match dtype {
-            Number::U8 => bytes.extend_from_slice(&observation.image),
-            _ => bytes.extend_from_slice(bytemuck::cast_slice(&observation.vector)),
-        }
-        // An observation of another length is a fault of the game, which is reported after the tick.
-        bytes.resize(number * row, 0);
+/// Returns the numbers or the picture of an observation as bytes.
+fn bytes_of(seen: &Observation, dtype: Number) -> &[u8] {
+    match dtype {
+        Number::U8 => &seen.image,
+        _ => bytemuck::cast_slice(&seen.vector),
     }
-    bytes
 }
 
-/// Returns the mask of an agent: all actions are legal without one.
-fn legal(world: &World, agent: Entity, width: usize) -> Vec<u8> {
-    match (world.get::<LegalActions>(agent), world.get::<Agent>(agent)) {
-        (Some(legal), Some(Agent { actions, .. })) => legal.entries(actions).map(u8::from).collect(),
-        _ => vec![1; width],
-    }
+/// Returns a row of so many bytes, or nothing: a picture of another size is a fault of the game, which is reported after the
+/// tick.
+fn fitting(bytes: &[u8], width: usize) -> &[u8] {
+    if bytes.len() == width { bytes } else { &[] }
 }

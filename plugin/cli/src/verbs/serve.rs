@@ -169,6 +169,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
             After::Disabled => Autoreset::Disabled,
         },
     };
+    settings.check_memory()?;
     let listener = Listener::open(&address).map_err(|error| CliError::Usage(error.to_string()))?;
     interrupt::listen();
     interrupt::leave("recorded episodes that have ended are kept".to_owned());

@@ -6,15 +6,24 @@ any program with playbot's command line. It runs beside Python, and its arrays l
 - ``playbot.client``: the protocol, over numpy alone.
 - ``playbot.envs``: environments of Gymnasium.
 - ``playbot.pettingzoo``: games of several agents.
+- ``playbot.minari``: recordings as data sets, and back.
 - ``playbot.sb3``: vectors for Stable-Baselines3.
 """
 
+import importlib
 import importlib.util
 
 from playbot.client import Client, PlaybotError, ProgramEnded, Refused
 
 __all__ = ["Client", "PlaybotError", "ProgramEnded", "Refused", "make", "make_vec"]
 __version__ = "0.1.0"
+
+
+def __getattr__(name):
+    """Import the modules that need other libraries when they are asked for: ``playbot.sb3`` and the like."""
+    if name in ("envs", "minari", "pettingzoo", "sb3"):
+        return importlib.import_module(f"playbot.{name}")
+    raise AttributeError(f"module 'playbot' has no attribute {name!r}")
 
 
 def make(game=None, **options):

@@ -1,6 +1,8 @@
 """The client of the protocol: many arenas of a game in lockstep, as numpy arrays."""
 
 import atexit
+import difflib
+import enum
 import json
 import mmap
 import os
@@ -57,6 +59,22 @@ class Batch:
         self.arrays = arrays
 
 
+# Options of `playbot serve` for a program that the client starts.
+_OPTIONS = (
+    "arenas", "autoreset", "grayscale", "levels", "observation", "order", "render", "seed", "size", "stack", "threads",
+    "transport",
+)
+
+
+def check_options(options):
+    """Raise a TypeError for an option that there is not, with the nearest one."""
+    for name in options:
+        if name not in _OPTIONS:
+            near = difflib.get_close_matches(name, _OPTIONS, 1)
+            hint = "levels='MODE:0..499' names a mode" if name == "mode" else f"did you mean {near[0]!r}?" if near else ""
+            raise TypeError(f"there is no option {name!r}: {hint or 'the options are ' + ', '.join(_OPTIONS)}")
+
+
 class Client:
     """A game that another program plays, in ``arenas`` that step together.
 
@@ -73,6 +91,7 @@ class Client:
         self._socket = None
         self._memory = None
         self._pid = os.getpid()
+        check_options(options)
         try:
             if address is None:
                 self._program = Program(game, program, options)
@@ -82,6 +101,8 @@ class Client:
                     raise ValueError("a program that serves already has its own game and options: leave yours out")
                 kind = "unix" if os.sep in address else "tcp"
             self._connect(kind, address)
+            if self._program is not None:
+                self._program.forget_folder()
             self.description = self._hello()
             self._lay_out()
         except BaseException:
@@ -170,7 +191,8 @@ class Client:
         self.close()
 
     def __del__(self):
-        self.close()
+        if "_socket" in self.__dict__:
+            self.close()
 
     # The protocol.
 
@@ -252,6 +274,8 @@ class Client:
     def _send(self, kind, content=b""):
         if self._socket is None:
             raise PlaybotError("the environment is closed")
+        if self._pid != os.getpid():
+            raise PlaybotError("the environment was made in another process: make one in each")
         try:
             self._socket.sendall(_HEAD_OF_MESSAGE.pack(len(content) + 1, kind) + content)
         except OSError as error:
@@ -337,29 +361,38 @@ class Program:
             if value is True:
                 words.append(flag)
             elif value is not None and value is not False:
-                words += [flag, str(value).replace("_", "-") if name == "autoreset" else str(value)]
+                # Gymnasium's own names of the modes are values of an enumeration.
+                value = str(value.name if isinstance(value, enum.Enum) else value)
+                words += [flag, value.lower().replace("_", "-") if name == "autoreset" else value]
         # Other programs of a terminal hear Ctrl-C too: this one ends when its client leaves.
         self._words = tempfile.TemporaryFile()
         self._process = subprocess.Popen(
             words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=self._words, start_new_session=True
         )
         line = self._process.stdout.readline()
-        if not line:
+        try:
+            begun = json.loads(line)
+        except ValueError:
             words = self.last_words(f"{path} has not begun to serve")
             self.end()
-            raise ProgramEnded(words)
-        begun = json.loads(line)
+            raise ProgramEnded(words) from None
         self.address, self.socket = begun["address"], begun["socket"]
+
+    def forget_folder(self):
+        """Remove the folder of the socket, which nobody else connects to."""
+        shutil.rmtree(self._folder, ignore_errors=True)
 
     def last_words(self, words):
         """Return these words, the exit code, and the last lines of the program."""
         try:
-            words += f", with exit code {self._process.wait(timeout=5)}"
+            code = self._process.wait(timeout=5)
+            words += f", by signal {-code}" if code < 0 else f", with exit code {code}"
         except subprocess.TimeoutExpired:
             pass
         self._words.seek(0, os.SEEK_END)
         self._words.seek(max(0, self._words.tell() - 2000))
-        lines = self._words.read().decode(errors="replace").strip()
+        lines = self._words.read().decode(errors="replace").strip().splitlines()
+        lines = "\n".join(line for line in lines if not line.endswith("is connected"))
         return f"{words}:\n{lines}" if lines else words
 
     def end(self):

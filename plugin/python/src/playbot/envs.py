@@ -8,7 +8,9 @@ from gymnasium.vector import AutoresetMode
 from playbot.client import Client
 
 # The games of the program `playbot`; those of other programs go by `playbot/Game-v0`.
-_GAMES = ("coinrun", "maze2d", "maze2d-sighted", "maze2d-mapped", "ant", "antmaze", "antmaze-sighted", "antmaze-mapped")
+_GAMES = ("coinrun", "ant") + tuple(
+    game + kind for game in ("maze2d", "antmaze") for kind in ("", "-sighted", "-mapped", "-placed")
+)
 
 
 def register():
@@ -58,7 +60,27 @@ def actions_of(client, actions):
     return actions
 
 
-def _mask(description, legal):
+def connect(game, wanted, options):
+    """Return a client with the options ``wanted``, which a program that serves already has to have."""
+    if "address" not in options:
+        return Client(game, **wanted, **options)
+    client = Client(game, **options)
+    has = {name: client.description[name] for name in wanted}
+    if has != wanted:
+        client.close()
+        raise ValueError(f"the program at {options['address']} serves {has}, and {wanted} is wanted")
+    return client
+
+
+def check_keys(options, known):
+    """Raise a ValueError for an option of ``reset`` that there is not."""
+    unknown = set(options or {}) - set(known)
+    if unknown:
+        raise ValueError(f"reset has no options {sorted(unknown)}: there are {', '.join(known)}")
+    return options or {}
+
+
+def mask_of(description, legal):
     """Return masks in the form that ``Discrete.sample(mask=...)`` takes: 1 for each legal option."""
     action = description["action"]
     options = action["count"] if action["kind"] == "discrete" else sum(action.get("choices", ()))
@@ -81,7 +103,8 @@ class Env(gym.Env):
         self.render_mode = render_mode
         if render_mode and options.get("observation", "vector") == "vector":
             options.setdefault("render", 256)
-        self.client = Client(game, arenas=1, autoreset="disabled", **options)
+        self.client = None
+        self.client = connect(game, {"arenas": 1, "autoreset": "disabled"}, options)
         description = self.client.description
         if description["agents"] != 1:
             self.client.close()
@@ -93,7 +116,7 @@ class Env(gym.Env):
     def reset(self, *, seed=None, options=None):
         """Begin an episode, and return its first observation."""
         super().reset(seed=seed)
-        level = (options or {}).get("level")
+        level = check_keys(options, ["level"]).get("level")
         batch = self.client.reset(seed, None if level is None else [level])
         return batch.observations[0].copy(), self._info(batch)
 
@@ -114,12 +137,13 @@ class Env(gym.Env):
 
     def close(self):
         """End the game."""
-        self.client.close()
+        if self.client is not None:
+            self.client.close()
 
     def _info(self, batch):
         info = {"level": int(batch.level[0]), "tick": int(batch.tick[0]), "success": bool(batch.success[0])}
         if self.client.description["action"]["kind"] != "continuous":
-            info["action_mask"] = _mask(self.client.description, batch.legal[0])
+            info["action_mask"] = mask_of(self.client.description, batch.legal[0])
         return info
 
 
@@ -128,7 +152,7 @@ class VectorEnv(gym.vector.VectorEnv):
 
     After the last step of an episode, ``autoreset="next_step"`` (the default, as in Gymnasium) ignores one action of that
     arena and shows the first observation of the next episode; with ``"same_step"`` the last step shows it, and
-    ``infos["final_obs"]`` has the last one; with ``"disabled"`` the arena waits for
+    ``infos["final_obs"]`` has the last one, while level and tick are those of the next; with ``"disabled"`` the arena waits for
     ``reset(options={"reset_mask": mask})``. ``reset(options={"levels": [...]})`` names a level for each arena.
 
     Observations are copied, unless ``copy=False``: then they are views of shared memory, which change with the second step
@@ -143,7 +167,11 @@ class VectorEnv(gym.vector.VectorEnv):
         self.render_mode = render_mode
         if render_mode and options.get("observation", "vector") == "vector":
             options.setdefault("render", 256)
-        self.client = Client(game, arenas=num_envs, autoreset=autoreset, **options)
+        self.client = None
+        autoreset = str(getattr(autoreset, "name", autoreset)).lower()
+        if autoreset not in _MODES:
+            raise ValueError(f"autoreset is {autoreset!r}: there are {', '.join(_MODES)}")
+        self.client = connect(game, {"arenas": num_envs, "autoreset": autoreset}, options)
         description = self.client.description
         if description["agents"] != num_envs:
             self.client.close()
@@ -164,14 +192,20 @@ class VectorEnv(gym.vector.VectorEnv):
 
     def reset(self, *, seed=None, options=None):
         """Begin episodes, and return their first observations."""
-        options = options or {}
-        if isinstance(seed, (list, tuple)):
-            # Arena i draws its levels from a stream of its own, whatever the seed.
-            seed = seed[0]
-        super().reset(seed=seed)
-        mask = options.get("reset_mask")
+        options = check_keys(options, ["levels", "reset_mask"])
+        mask, seeds = options.get("reset_mask"), None
         arenas = None if mask is None else np.flatnonzero(mask)
+        if seed is not None and not isinstance(seed, (int, np.integer)):
+            seeds = list(seed)
+            if len(seeds) != self.num_envs:
+                raise ValueError(f"{len(seeds)} seeds for {self.num_envs} arenas: give one for each, or one for all")
+            seed = seeds[0]
+        super().reset(seed=seed)
         batch = self.client.reset(seed, options.get("levels"), arenas)
+        if seeds is not None and arenas is None and options.get("levels") is None:
+            for arena, own in enumerate(seeds):
+                if own is not None:
+                    batch = self.client.reset(own, arenas=[arena])
         return self._seen(batch.observations), self._infos(batch)
 
     def step(self, actions):
@@ -196,13 +230,14 @@ class VectorEnv(gym.vector.VectorEnv):
 
     def close_extras(self, **_):
         """End the game."""
-        self.client.close()
+        if self.client is not None:
+            self.client.close()
 
     def _seen(self, observations):
         return observations.copy() if self._copies else observations
 
     def _infos(self, batch):
-        infos = {"level": batch.level.copy(), "success": batch.success.copy()}
+        infos = {"level": batch.level.copy(), "tick": batch.tick.copy(), "success": batch.success.copy()}
         if self._has_masks:
-            infos["action_mask"] = _mask(self.client.description, batch.legal)
+            infos["action_mask"] = mask_of(self.client.description, batch.legal)
         return {**infos, **{"_" + name: self._all for name in infos}}

@@ -3,8 +3,7 @@
 import numpy as np
 from pettingzoo import ParallelEnv
 
-from playbot.client import Client
-from playbot.envs import action_space, actions_of, observation_space
+from playbot.envs import action_space, actions_of, connect, mask_of, observation_space
 
 
 class Parallel(ParallelEnv):
@@ -20,7 +19,8 @@ class Parallel(ParallelEnv):
         self.render_mode = render_mode
         if render_mode and options.get("observation", "vector") == "vector":
             options.setdefault("render", 256)
-        self.client = Client(game, arenas=1, autoreset="disabled", **options)
+        self.client = None
+        self.client = connect(game, {"arenas": 1, "autoreset": "disabled"}, options)
         description = self.client.description
         self.metadata = {**self.metadata, "name": description["game"], "render_fps": description["tick_hz"]}
         seats = description["seats"]
@@ -68,7 +68,8 @@ class Parallel(ParallelEnv):
 
     def close(self):
         """End the game."""
-        self.client.close()
+        if self.client is not None:
+            self.client.close()
 
     def _rows(self):
         return [(row, agent) for row, agent in enumerate(self.possible_agents) if agent in self.agents]
@@ -77,7 +78,11 @@ class Parallel(ParallelEnv):
         return {agent: np.array(array[row]) for row, agent in self._rows()}
 
     def _infos(self, batch):
-        return {
+        infos = {
             agent: {"level": int(batch.level[row]), "tick": int(batch.tick[row]), "success": bool(batch.success[row])}
             for row, agent in self._rows()
         }
+        if self.client.description["action"]["kind"] != "continuous":
+            for row, agent in self._rows():
+                infos[agent]["action_mask"] = mask_of(self.client.description, batch.legal[row])
+        return infos

@@ -1,10 +1,11 @@
 """Vectors for Stable-Baselines3."""
 
+import time
+
 import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
 
-from playbot.client import Client
-from playbot.envs import action_space, observation_space
+from playbot.envs import action_space, connect, mask_of, observation_space
 
 
 class Vector(VecEnv):
@@ -15,11 +16,12 @@ class Vector(VecEnv):
     """
 
     def __init__(self, game=None, num_envs=64, **options):
-        self.client = Client(game, arenas=num_envs, autoreset="same_step", **options)
+        self.client = connect(game, {"arenas": num_envs, "autoreset": "same_step"}, options)
         description = self.client.description
         self.render_mode = "rgb_array" if options.get("render") else None
         super().__init__(num_envs, observation_space(description), action_space(description))
-        self._actions = None
+        self._actions = self._levels = self._masks = None
+        self._begun = time.monotonic()
         self._returns, self._lengths = np.zeros(num_envs), np.zeros(num_envs, np.int64)
 
     def reset(self):
@@ -27,7 +29,9 @@ class Vector(VecEnv):
         seed = self._seeds[0]
         self._reset_seeds()
         self._returns[:], self._lengths[:] = 0, 0
-        return self.client.reset(seed).observations.copy()
+        batch = self.client.reset(seed)
+        self._note(batch)
+        return batch.observations.copy()
 
     def step_async(self, actions):
         """Take the actions of the next step."""
@@ -45,10 +49,24 @@ class Vector(VecEnv):
                 "terminal_observation": batch.final_observations[row].copy(),
                 "TimeLimit.truncated": bool(batch.truncated[row] and not batch.terminated[row]),
                 "is_success": bool(batch.success[row]),
-                "episode": {"r": float(self._returns[row]), "l": int(self._lengths[row]), "t": 0.0},
+                "level": int(self._levels[row]),
+                "episode": {
+                    "r": float(self._returns[row]),
+                    "l": int(self._lengths[row]),
+                    "t": round(time.monotonic() - self._begun, 6),
+                },
             }
             self._returns[row], self._lengths[row] = 0, 0
+        self._note(batch)
         return batch.observations.copy(), rewards, done, infos
+
+    def action_masks(self):
+        """Return the legal actions of each arena, as MaskablePPO of sb3-contrib asks for them."""
+        return self._masks
+
+    def _note(self, batch):
+        self._levels = batch.level.copy()
+        self._masks = mask_of(self.client.description, batch.legal).astype(bool)
 
     def close(self):
         """End the game."""
@@ -68,6 +86,8 @@ class Vector(VecEnv):
 
     def env_method(self, method_name, *args, indices=None, **kwargs):
         """Call a method of this vector, for each arena."""
+        if method_name == "action_masks":
+            return [self._masks[row] for row in self._get_indices(indices)]
         return [getattr(self, method_name)(*args, **kwargs) for _ in self._get_indices(indices)]
 
     def env_is_wrapped(self, wrapper_class, indices=None):
