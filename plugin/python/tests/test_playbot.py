@@ -195,14 +195,14 @@ def test_what_is_not_there_is_named():
 
 def test_wrong_options_are_named_before_a_program_is_started():
     with pytest.raises(TypeError, match="did you mean 'levels'"):
-        playbot.make("coinrun", levles=EASY)
+        playbot.make("coinrun", levelz=EASY)
     with pytest.raises(TypeError, match="names a mode"):
         playbot.make("coinrun", mode="hard")
     with pytest.raises(ValueError, match="there are next_step, same_step, disabled"):
         playbot.make_vec("coinrun", autoreset="never")
     env = playbot.make("coinrun", levels=EASY)
     with pytest.raises(ValueError, match="reset has no options"):
-        env.reset(options={"levle": 7})
+        env.reset(options={"stage": 7})
     env.close()
     env.close()
 
