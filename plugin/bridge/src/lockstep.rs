@@ -323,11 +323,11 @@ pub fn led_by(settings: &Settings<'_>, memory: &Arc<Memory>, leader: impl Leader
             Ok(built) => built,
             Err(why) => return leader.fail(&why),
         };
-        let orders = Orders::Leads(Mutex::new(Led { lockstep, leader }));
+        let orders = Orders::Leads(Box::new(Mutex::new(Led { lockstep, leader })));
         let mut world = seated(world, agents, first.start, Line::new(settings, memory, orders));
         let Err(why) = play(&mut world) else { return };
         if let Some(Seats { line: Line { orders: Orders::Leads(led), .. }, .. }) = world.remove_resource() {
-            led.into_inner().unwrap_or_else(PoisonError::into_inner).leader.fail(&why);
+            (*led).into_inner().unwrap_or_else(PoisonError::into_inner).leader.fail(&why);
         }
     });
 }

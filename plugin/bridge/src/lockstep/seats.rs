@@ -49,7 +49,7 @@ pub(super) enum Orders {
     /// From another thread, which gets replies.
     Follows { orders: Mutex<Receiver<Order>>, replies: Arc<Replies> },
     /// From a leader on this thread, who gives orders to all Worlds.
-    Leads(Mutex<Led>),
+    Leads(Box<Mutex<Led>>),
 }
 
 pub(super) struct Led {
