@@ -60,8 +60,13 @@ def actions_of(client, actions):
     return actions
 
 
-def connect(game, wanted, options):
-    """Return a client with the options ``wanted``, which a program that serves already has to have."""
+def connect(game, wanted, options, render_mode=None):
+    """Return a client with the options ``wanted``, which a program that serves already has to have.
+
+    With a ``render_mode`` it draws for people, unless agents see pictures.
+    """
+    if render_mode and options.get("observation", "vector") == "vector":
+        options = {"render": 256, **options}
     if "address" not in options:
         return Client(game, **wanted, **options)
     client = Client(game, **options)
@@ -69,6 +74,18 @@ def connect(game, wanted, options):
     if has != wanted:
         client.close()
         raise ValueError(f"the program at {options['address']} serves {has}, and {wanted} is wanted")
+    return client
+
+
+def connect_alone(game, wanted, options, render_mode):
+    """Return a client as ``connect`` does, of a game with one agent in each arena."""
+    if render_mode not in (None, "rgb_array"):
+        raise ValueError(f"render_mode is {render_mode!r}: there is None, and 'rgb_array'")
+    client = connect(game, wanted, options, render_mode)
+    description = client.description
+    if description["agents"] != wanted["arenas"]:
+        client.close()
+        raise ValueError(f"{description['game']} has {description['agents']} agents: see playbot.pettingzoo")
     return client
 
 
@@ -98,17 +115,10 @@ class Env(gym.Env):
     metadata = {"render_modes": ["rgb_array"]}
 
     def __init__(self, game=None, *, render_mode=None, **options):
-        if render_mode not in (None, "rgb_array"):
-            raise ValueError(f"render_mode is {render_mode!r}: there is None, and 'rgb_array'")
         self.render_mode = render_mode
-        if render_mode and options.get("observation", "vector") == "vector":
-            options.setdefault("render", 256)
         self.client = None
-        self.client = connect(game, {"arenas": 1, "autoreset": "disabled"}, options)
+        self.client = connect_alone(game, {"arenas": 1, "autoreset": "disabled"}, options, render_mode)
         description = self.client.description
-        if description["agents"] != 1:
-            self.client.close()
-            raise ValueError(f"{description['game']} has {description['agents']} agents: see playbot.pettingzoo")
         self.metadata = {**self.metadata, "render_fps": description["tick_hz"]}
         self.observation_space = observation_space(description)
         self.action_space = action_space(description)
@@ -162,20 +172,13 @@ class VectorEnv(gym.vector.VectorEnv):
     metadata = {"render_modes": ["rgb_array"]}
 
     def __init__(self, game=None, *, num_envs=64, autoreset="next_step", copy=True, render_mode=None, **options):
-        if render_mode not in (None, "rgb_array"):
-            raise ValueError(f"render_mode is {render_mode!r}: there is None, and 'rgb_array'")
         self.render_mode = render_mode
-        if render_mode and options.get("observation", "vector") == "vector":
-            options.setdefault("render", 256)
         self.client = None
         autoreset = str(getattr(autoreset, "name", autoreset)).lower()
         if autoreset not in _MODES:
             raise ValueError(f"autoreset is {autoreset!r}: there are {', '.join(_MODES)}")
-        self.client = connect(game, {"arenas": num_envs, "autoreset": autoreset}, options)
+        self.client = connect_alone(game, {"arenas": num_envs, "autoreset": autoreset}, options, render_mode)
         description = self.client.description
-        if description["agents"] != num_envs:
-            self.client.close()
-            raise ValueError(f"{description['game']} has several agents: see playbot.pettingzoo")
         self.num_envs = num_envs
         self.metadata = {
             **self.metadata,

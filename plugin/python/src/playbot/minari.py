@@ -14,7 +14,7 @@ import numpy as np
 from minari.data_collector import EpisodeBuffer
 
 from playbot.client import Client, PlaybotError, find_program
-from playbot.envs import action_space, observation_space
+from playbot.envs import action_space, actions_of, observation_space
 
 
 def episodes_of(recording, program=None):
@@ -74,7 +74,7 @@ def _played(client, recording, episode, number):
     batch = client.reset(levels=[episode["level"]])
     observations, rewards, kind = [batch.observations[0].copy()], [], client.description["action"]["kind"]
     for tick, (action, recorded) in enumerate(zip(episode["actions"], episode["rewards"])):
-        batch = client.step(_row(action, kind))
+        batch = client.step(actions_of(client, _row(action, kind)))
         if np.float32(recorded) != batch.rewards[0]:
             raise PlaybotError(
                 f"{recording}, episode {episode['episode']}, tick {tick}: the reward is {batch.rewards[0]}, and {recorded} was "
@@ -163,7 +163,7 @@ def _replayed(client, number, episode, level):
         )
         if kind == "mixed" and not isinstance(action, dict):
             action = {"choices": action}
-        batch = client.step(_row(action, kind) if kind != "mixed" or len(action) > 1 else np.array([action["choices"]]))
+        batch = client.step(actions_of(client, _row(action, kind)))
         if np.float32(episode.rewards[tick]) != batch.rewards[0]:
             raise PlaybotError(
                 f"episode {number}, tick {tick}: the game's reward is {batch.rewards[0]}, and that of the data set is "

@@ -17,10 +17,8 @@ class Parallel(ParallelEnv):
 
     def __init__(self, game=None, *, render_mode=None, **options):
         self.render_mode = render_mode
-        if render_mode and options.get("observation", "vector") == "vector":
-            options.setdefault("render", 256)
         self.client = None
-        self.client = connect(game, {"arenas": 1, "autoreset": "disabled"}, options)
+        self.client = connect(game, {"arenas": 1, "autoreset": "disabled"}, options, render_mode)
         description = self.client.description
         self.metadata = {**self.metadata, "name": description["game"], "render_fps": description["tick_hz"]}
         seats = description["seats"]
