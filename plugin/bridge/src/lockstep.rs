@@ -172,7 +172,7 @@ pub enum StepError {
     Failed(String),
 }
 
-/// Worlds that step together, seen by whoever gives them orders.
+/// Worlds that step together, as the giver of their orders sees them.
 pub struct Lockstep {
     plan: Plan,
     memory: Arc<Memory>,
@@ -185,7 +185,7 @@ pub struct Lockstep {
     has_begun: bool,
 }
 
-/// Whoever gives orders to Worlds of which the first is played on its own thread.
+/// A giver of orders to Worlds of which the first is played on its own thread.
 pub trait Leader: Send + 'static {
     /// Gives an order, such as [`Lockstep::begin_step`]. All Worlds are ready, and the results of the last one are there.
     /// Returns false at the end.
@@ -230,7 +230,7 @@ impl Replies {
         if let Err(why) = reply {
             self.failed.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(why);
         }
-        // A World that fails when nobody waits for it is noticed with the next order.
+        // A World that fails between two orders is noticed with the next order.
         let before = self.awaited.fetch_update(Ordering::AcqRel, Ordering::Acquire, |awaited| awaited.checked_sub(1));
         if before == Ok(1) {
             // The caller may be gone.

@@ -188,7 +188,7 @@ impl Stream {
         }
     }
 
-    /// Ends the connection, also for whoever waits for a message of it.
+    /// Ends the connection, also for a thread that waits for a message of it.
     fn close(&self) {
         // It may be over.
         let _ = match self {

@@ -212,7 +212,7 @@ pub(super) fn play(world: &mut World) -> Result<(), String> {
         world.resource_scope(|world, mut seats: Mut<Seats>| {
             seats.end_tick();
             if seats.rows.iter().all(|row| row.stage.is_held()) && !seats.line.is_over {
-                // Nobody plays in the next tick, so it is not run.
+                // No agent plays in the next tick, so it is not run.
                 seats.show(world);
                 seats.obey(world);
             }
