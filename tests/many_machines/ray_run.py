@@ -1,7 +1,6 @@
 """Test of Ray with workers that are killed half-way: no level is lost, and none is played twice.
 
-Called by run.sh with the program `playbot`. It runs docs/how-to/many-machines/playbot_ray.py with three workers. Of one
-shard it kills the worker and the program together, as a machine that goes down does; of a second one only the program; of a
+Called by run.sh with the program `playbot`. It runs `playbot test --cluster ray` with three workers. Of one shard it kills the worker and the program together, as a machine that goes down does; of a second one only the program; of a
 third one only the worker. The joined results must be those of one process, byte for byte. Works on Linux, which has the processes in
 /proc.
 """
@@ -25,7 +24,7 @@ AT_WORK = 4
 # The killed processes of each shard.
 KILLS = {0: "worker and program", 1: "program", 2: "worker"}
 LONGEST = 300.0
-SCRIPT = pathlib.Path(__file__).parents[2] / "docs/how-to/many-machines/playbot_ray.py"
+SOURCES = str(pathlib.Path(__file__).parents[2] / "plugin/python/src")
 
 
 def whole_lines(journal):
@@ -112,12 +111,13 @@ def main():
     started = time.monotonic()
     code = subprocess.run(one, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False).returncode
     print(f"one process: exit code {code}, {time.monotonic() - started:.1f} s")
-    call = [sys.executable, str(SCRIPT), "--program", playbot, "--game", "coinrun", "--levels", FIRST_TO_LAST, *TEST]
-    call += ["--shards", str(SHARDS), "--workers", str(WORKERS), "--out", str(out), "--", *MORE]
+    call = [playbot, "test", "coinrun", "--levels", FIRST_TO_LAST, *TEST, *MORE, "--out", str(out)]
+    call += ["--cluster", "ray", "--workers", str(WORKERS), "--shards", str(SHARDS)]
+    environment = {**os.environ, "PLAYBOT_PYTHON": sys.executable, "PYTHONPATH": SOURCES, "RAY_ADDRESS": "local"}
     started = time.monotonic()
     log = folder / "log"
     with open(log, "wb") as file:
-        driver = subprocess.Popen(call, stdout=file, stderr=file, cwd=folder)
+        driver = subprocess.Popen(call, stdout=file, stderr=file, cwd=folder, env=environment)
         try:
             kept = kill_half_way(out, driver)
             ended = driver.wait(LONGEST)
@@ -138,7 +138,7 @@ def main():
     for name in sorted(single.keys() - set(findings)):
         check(f"{name}: {len(single[name])} bytes, equal to those of one process", joined[name] == single[name])
     check("the findings are equal, too", joined == single)
-    again = subprocess.run(call, cwd=folder, capture_output=True, check=False)
+    again = subprocess.run([*call, "--resume"], cwd=folder, capture_output=True, env=environment, check=False)
     check("the same call on finished shards changes nothing", again.returncode == code and files(out) == single)
     shutil.rmtree(folder)
 

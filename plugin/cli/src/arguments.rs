@@ -6,8 +6,10 @@
 //! - `open`: opening of files that the command line names, with advice for missing ones.
 //! - `experiment`: reading of experiments, from a path or from those that come with the program, with the changes of
 //!   the command line.
+//! - `cluster`: workers on this machine and on others.
 //! - `player`: players named on the command line, and their measurement.
 
+pub(crate) mod cluster;
 pub(crate) mod experiment;
 pub(crate) mod open;
 pub(crate) mod player;

@@ -11,7 +11,7 @@ use crate::{
     verbs::{
         bench, bisect, bugs, completions, config, demo, diagnose, doctor, eval, explore, eyes, history, imitate, init,
         learn_skills, level, levels, play, policy, quickstart, record, replay, report, review, runs, serve, skills,
-        study, teach, test, trace, train, view, watch,
+        study, teach, test, trace, train, view, watch, work,
     },
 };
 use bevy_playbot::unknown_name::{nearest, question};
@@ -112,6 +112,7 @@ enum Verb {
     Watch(watch::Args),
     Bench(bench::Args),
     Serve(serve::Args),
+    Work(work::Args),
     Bugs(bugs::Args),
     Completions(completions::Args),
 }
@@ -291,6 +292,8 @@ fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
         Verb::Watch(args) => args.compute.threads(),
         Verb::Bench(args) => args.threads,
         Verb::Serve(args) => args.threads.count(),
+        // There is a worker for each processor.
+        Verb::Work(_) => 1,
         _ => usable_threads(default_threads()),
     };
     // Networks take no others, wherever they are computed.
@@ -331,6 +334,7 @@ fn run_on_threads(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
         Verb::Watch(args) => watch::run(&args, games),
         Verb::Bench(args) => bench::run(args, games),
         Verb::Serve(args) => serve::run(args, games),
+        Verb::Work(args) => work::run(&args, games),
         Verb::Bugs(args) => bugs::run(args, games),
         Verb::Completions(args) => completions::run(&args, with_own_name(Cli::command())),
     }

@@ -53,6 +53,25 @@ fn write_data(text: &str) -> Result<(), CliError> {
     })
 }
 
+/// Standard output for data that is no text.
+pub(crate) struct DataStream;
+
+impl Write for DataStream {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match DATA.lock().unwrap_or_else(PoisonError::into_inner).as_mut() {
+            Some(data) => data.write(bytes),
+            None => io::stdout().lock().write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match DATA.lock().unwrap_or_else(PoisonError::into_inner).as_mut() {
+            Some(data) => data.flush(),
+            None => io::stdout().lock().flush(),
+        }
+    }
+}
+
 /// Returns whether data is shown on a terminal.
 pub(crate) fn shows_on_terminal() -> bool {
     match DATA.lock().unwrap_or_else(PoisonError::into_inner).as_ref() {

@@ -30,7 +30,7 @@ const GROUPS: [(&str, &[&str]); 7] = [
             "bench",
         ],
     ),
-    ("Let other programs play", &["serve"]),
+    ("Let other programs play", &["serve", "work"]),
     ("Use the shell", &["completions"]),
 ];
 

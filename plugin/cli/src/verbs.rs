@@ -7,7 +7,7 @@
 //! - Record: [`record`], [`demo`].
 //! - Learn: [`quickstart`], [`teach`], [`learn_skills`], [`imitate`], [`train`], [`diagnose`], [`study`], [`eval`],
 //!   [`config`], [`runs`], [`policy`], [`bench`].
-//! - Let other programs play: [`serve`].
+//! - Let other programs play: [`serve`]; play for others: [`work`].
 //! - Use the shell: [`completions`].
 //!
 //! A verb reads its options, opens what they name, calls the library, and prints what comes back. Options that several
@@ -49,3 +49,4 @@ pub(crate) mod trace;
 pub(crate) mod train;
 pub(crate) mod view;
 pub(crate) mod watch;
+pub(crate) mod work;

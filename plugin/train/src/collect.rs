@@ -604,6 +604,27 @@ pub struct ArenaState {
     streams: [RngState; 3],
 }
 
+impl ArenaState {
+    /// Returns the state of an arena before its first episode, whose agent has these random streams.
+    pub(crate) fn begun(space: &ActionSpace, streams: &AgentStreams) -> Self {
+        Self {
+            level: None,
+            actions: Actions::empty(space),
+            state_hash: 0,
+            skill: Vec::new(),
+            skill_ticks_left: 0,
+            memory: Vec::new(),
+            skill_memory: SkillMemory::default(),
+            streams: [&streams.level, &streams.action, &streams.skill].map(RngState::of),
+        }
+    }
+
+    /// Returns the state of an arena that leaves its episode, in a World where none has begun.
+    pub(crate) fn left(&self, space: &ActionSpace) -> Self {
+        Self { streams: self.streams.clone(), ..Self::begun(space, &AgentStreams::default()) }
+    }
+}
+
 /// Failure to restore an arena.
 #[derive(Debug, Error)]
 pub enum RestoreError {

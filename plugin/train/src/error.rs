@@ -1,6 +1,7 @@
 //! Errors of training.
 
 use crate::{
+    cluster::ClusterError,
     collect::RestoreError,
     experiment::{Algorithm, ExperimentError, error::ConfigError},
 };
@@ -117,6 +118,9 @@ pub enum TrainError {
     /// A checkpoint could not be restored.
     #[error(transparent)]
     Restore(#[from] RestoreError),
+    /// The workers of a cluster do not play.
+    #[error(transparent)]
+    Cluster(#[from] ClusterError),
     /// Matches with rivals cannot be played.
     #[error("the rating of rivals failed: {0}")]
     Rivals(Box<MatchError>),
@@ -128,6 +132,7 @@ impl HasExitCode for TrainError {
             Self::Fault(_) | Self::Restore(RestoreError::Fault(_)) => 2,
             Self::Learn(error) => error.exit_code(),
             Self::Rivals(error) => error.exit_code(),
+            Self::Cluster(error) => error.exit_code(),
             _ => 3,
         }
     }

@@ -9,7 +9,8 @@
 //! - [`experiment`]: experiments and their settings.
 //! - [`recordings`] and [`demo`]: recordings of an experiment, and data sets made from them.
 //! - [`learn_skills`]: the learning of a skill model.
-//! - [`trainer`]: the training loop, one update at a time ([`Trainer`]); [`collect`]: the Worlds that play for it.
+//! - [`trainer`]: the training loop, one update at a time ([`Trainer`]); [`collect`]: the Worlds that play for it;
+//!   [`cluster`]: Worlds in other processes.
 //! - [`train_run`]: a whole run ([`train_run::Training`]), with its folder ([`run_dir`]), checkpoints
 //!   ([`checkpoint`]), metrics ([`metrics_log`], [`tensorboard`]) and observer ([`run_observer`]).
 //! - [`self_play`]: a training against rivals, and their [`ladder`](self_play::ladder).
@@ -24,6 +25,7 @@
 pub mod ancestor;
 pub mod begin_from;
 pub mod checkpoint;
+pub mod cluster;
 pub mod collect;
 pub mod demo;
 pub mod diagnose;

@@ -3,9 +3,11 @@
 //!
 //! The folder:
 //!
+//! - `away`: Worlds that play in other processes.
 //! - `rivals`: rivals of a trainer, between its rollouts and in its checkpoints.
 //! - `warnings`: numbers that are hard to learn from, and large buffers.
 
+mod away;
 mod rivals;
 mod warnings;
 
@@ -17,7 +19,10 @@ use crate::{
     levels::{EndedEpisode, LevelPlan, LevelState},
     metrics_log::{RECENT, Timing, UpdateReport},
     self_play::SelfPlay,
-    trainer::warnings::{normalises_observations, strange_scales, warn_of_large_buffer},
+    trainer::{
+        away::Away,
+        warnings::{normalises_observations, strange_scales, warn_of_large_buffer},
+    },
 };
 use bevy::prelude::World;
 use bevy_playbot::{
@@ -52,6 +57,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+pub use crate::trainer::away::ClusterReport;
+
 /// Rows on which the first policy is compared with the decoder.
 const INITIAL_KL_ROWS: usize = 1024;
 
@@ -79,6 +86,8 @@ pub struct Trainer {
     obs: Observations,
     /// The rivals, in a training against some.
     self_play: Option<SelfPlay>,
+    /// The arenas, if they are played in other processes.
+    away: Option<Away>,
 }
 
 impl Trainer {
@@ -188,6 +197,7 @@ impl Trainer {
             obs_kind,
             obs,
             self_play,
+            away: None,
         };
         trainer.renew_queues();
         Ok(trainer)
@@ -270,6 +280,7 @@ impl Trainer {
     /// Goes on in the Worlds of a lesson in another mode. Episodes that still run are left: the rollout ended with the
     /// values of their states, as each does.
     fn change_worlds(&mut self, lesson: usize) {
+        self.change_shares();
         let Some((_, collectors)) = self.later.pop_front_if(|(first, _)| *first == lesson) else { return };
         let streams: Vec<_> = self.collectors.iter().flat_map(Collector::streams).collect();
         let rivals = self.arena_rivals();
@@ -315,6 +326,12 @@ impl Trainer {
     fn collect(&mut self, policy: &Policy, latent: usize, steps: usize) -> Result<Collected, TrainError> {
         let start = Instant::now();
         let mut obs = std::mem::replace(&mut self.obs, Observations::empty(&self.obs_kind));
+        if self.away.is_some() {
+            let (shares, collected) = self.collect_away(policy, latent, steps, &mut obs)?;
+            let played = start.elapsed();
+            self.note_played(played);
+            return self.joined(obs, shares, collected, played, Duration::ZERO);
+        }
         let shares: Vec<usize> = self.collectors.iter().map(|collector| collector.agents().len()).collect();
         let columns = obs.columns(&self.obs_kind, steps, &shares);
         let mut work: Vec<_> = self.collectors.iter_mut().zip(columns).collect();
@@ -342,6 +359,18 @@ impl Trainer {
             [.., last_but_one, last] if !is_bound && self.threads > 1 => *last - *last_but_one,
             _ => played.saturating_sub(shared_time() - shared),
         };
+        self.joined(obs, shares, collected, played, alone)
+    }
+
+    /// Joins the results of all Worlds, which have these numbers of agents and filled the columns of `obs`.
+    fn joined(
+        &self,
+        obs: Observations,
+        shares: Vec<usize>,
+        collected: Vec<OfWorld>,
+        played: Duration,
+        alone: Duration,
+    ) -> Result<Collected, TrainError> {
         let (mut rollouts, mut finished, mut agents) = (Vec::new(), Vec::new(), 0);
         for (part, share) in collected.into_iter().zip(shares) {
             let (rollout, ended) = part?;
@@ -418,7 +447,8 @@ impl Trainer {
 
     /// Returns the state of each arena, by the Worlds of the experiment: their number on this machine is not kept.
     pub(crate) fn save_arenas(&mut self) -> Vec<Vec<ArenaState>> {
-        let all: Vec<ArenaState> = self.collectors.iter_mut().flat_map(save_arenas).collect();
+        let here = |collectors: &mut Vec<Collector>| collectors.iter_mut().flat_map(save_arenas).collect();
+        let all: Vec<ArenaState> = self.states_away().unwrap_or_else(|| here(&mut self.collectors));
         all.chunks(self.per_world.max(1)).map(<[_]>::to_vec).collect()
     }
 

@@ -2,11 +2,13 @@
 //!
 //! The folder, in reading order:
 //!
+//! - `on_cluster`: tests whose shards other machines play.
 //! - `testers`: testers on the command line.
 //! - `results`: report of results, and the files that go with them.
 //! - `scenes`: findings as the game shows them.
 //! - `regress`: replay of stored findings, and detectors on the command line.
 
+mod on_cluster;
 mod regress;
 mod results;
 mod scenes;
@@ -14,7 +16,8 @@ mod testers;
 
 use crate::{
     arguments::{
-        Compute, check_start_and_steps, default_tested, experiment::quoted, named_or_only, report_agents_along,
+        Compute, check_start_and_steps, cluster::ClusterArgs, default_tested, experiment::quoted, named_or_only,
+        report_agents_along,
     },
     error::{CliError, Outcome},
     output::check_folder,
@@ -71,7 +74,8 @@ pub use crate::verbs::test::results::{Results, report_results};
   playbot test GAME --levels MODE:0..99 --detect reward-loop --detector stuck.ticks=200 --out runs/test
   playbot test GAME --levels MODE:0..99 --par pars.json --out runs/test
   playbot test GAME --levels MODE:0..99 --history history.jsonl --build monday --out runs/test
-  playbot test GAME --levels MODE:0..99999 --shard 0/4 --out runs/shard-0   one of four machines")]
+  playbot test GAME --levels MODE:0..99999 --shard 0/4 --out runs/shard-0   one of four machines
+  playbot test GAME --levels MODE:0..99999 --cluster ray://head:10001 --out runs/test   on a cluster of Ray")]
 pub struct Args {
     /// Name of the game (not with --regress).
     game: Option<String>,
@@ -91,6 +95,11 @@ pub struct Args {
     /// Test only one part of the levels, as index/count, counted from 0. `playbot report merge` joins the results.
     #[arg(long, value_name = "INDEX/COUNT")]
     shard: Option<Shard>,
+    #[command(flatten)]
+    cluster: ClusterArgs,
+    /// Shards of a test on a cluster, at most as many as levels; with more of them less is lost with a worker.
+    #[arg(long, value_name = "N", requires = "cluster", conflicts_with = "shard", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    shards: u32,
     /// Folder of earlier results of the same version of the game, to report changes. Or a .demo recording of an earlier
     /// build, to report on which of the levels that it solves its actions lead elsewhere or end otherwise now.
     #[arg(long, value_name = "PATH")]
@@ -151,6 +160,14 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     let (json, split, threads) = (args.json, args.split, args.compute.threads());
     let results = Results { folder: out, against, game: Some(game), json, keeps_failures, split, threads };
     results.check()?;
+    if args.cluster.cluster.is_some() {
+        if recording.is_some() {
+            let words =
+                "the actions of a recording are played on one machine: leave out --cluster or --against FILE.demo";
+            return Err(CliError::Usage(words.to_owned()));
+        }
+        return on_cluster::run(args, &plan, &results);
+    }
     args.history.as_deref().map(|file| check_history(file, game)).transpose()?;
     let recorded = recording.map(|recording| RecordedWins::read(game, &plan, recording)).transpose()?;
     if let Some(before) = results.against {

@@ -3,6 +3,7 @@
 use crate::{
     arguments::{
         Compute, check_start_and_steps,
+        cluster::{ClusterArgs, report_cluster},
         experiment::{ExperimentArgs, Options, in_words, option, reaches, sets_key},
         number_of_steps, open, revision,
     },
@@ -39,6 +40,7 @@ use std::path::{Path, PathBuf};
   playbot train --algorithm ppo --run runs/baseline --steps 200000
   playbot train --skills skills.safetensors --run runs/weak --set score.kl_coef=0.01 --set ppo.lr=0.0003
   playbot train --algorithm ppo --from runs/baseline --run runs/slow --set ppo.lr=0.0001
+  playbot train GAME --algorithm ppo --run runs/many --cluster ray://head:10001 --workers 64
   playbot train --run runs/first --resume
   playbot train --run runs/first --resume --steps 1000000")]
 pub struct Args {
@@ -81,6 +83,8 @@ pub struct Args {
     seed: Option<u64>,
     #[command(flatten)]
     pub(crate) compute: Compute,
+    #[command(flatten)]
+    cluster: ClusterArgs,
     /// Save a checkpoint every this many updates, instead of the experiment's.
     #[arg(long)]
     checkpoint_every: Option<u64>,
@@ -122,6 +126,10 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         report_length(training.trainer.experiment());
     }
     interrupt::go_on_with(format!("`{program} train --run {path} --resume`"));
+    let game = games.get(&training.trainer.experiment().game)?;
+    if let Some(crew) = args.cluster.crew(game, training.trainer.experiment())? {
+        training.trainer.play_away(game, crew).map_err(TrainingError::from)?;
+    }
     let mut warning = FirstWarning::new(training.trainer.experiment(), &args.run);
     let mut console = console.on_update(|report| {
         if let Some(words) = warning.note(report) {
@@ -129,7 +137,9 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
             report!("warning: {words} (`{program} diagnose --run {path} --replays` looks further)");
         }
     });
-    if training.drive(&mut console)? {
+    let is_done = training.drive(&mut console)?;
+    training.trainer.cluster_report().iter().for_each(report_cluster);
+    if is_done {
         if let Some((lesson, of)) = training.trainer.lesson().filter(|(lesson, of)| lesson < of) {
             report!(
                 "warning: the training ended in lesson {lesson} of {of}, before that of `train`: train for longer with \
