@@ -178,7 +178,7 @@ def kubernetes(folder, playbot, whole):
                 time.sleep(0.005)
             stopped.send_signal(signal.SIGTERM)
             code = stopped.wait()
-            check("a pod that is asked to end ends with 130, its levels written", code == 130 and journal.read_bytes())
+            check("a pod that is asked to end ends with 143, its levels written", code == 143 and journal.read_bytes())
         done = run(command(test), folder, own)
         check(f"the pod of shard {index} succeeds, though it has findings", done.returncode == 0)
     wrong = run(command(test), folder, {**variables, "JOB_COMPLETION_INDEX": 0, "GAME": "none"})
@@ -226,13 +226,56 @@ def slurm(folder, playbot, whole):
     check("a shard that cannot be tested fails", (folder / "shards.code").read_text() == "3\n")
 
 
+def slurm_train(folder, playbot, _whole):
+    """Two nodes of Ray on this machine, which stand-ins of Slurm's commands start."""
+    script = FILES / "slurm-train.sh"
+    check("the script is one", run(["bash", "-n", str(script)], None, {}).returncode == 0)
+    program(folder / "bin/srun", """#!/usr/bin/env bash
+    while [[ "$1" == --* ]]; do shift; done
+    if [ "$1" = hostname ]; then echo 127.0.0.1; else exec "$@"; fi
+    """)
+    program(folder / "bin/scontrol", "#!/bin/sh\nprintf 'node0\\nnode1\\n'\n")
+    sources = pathlib.Path(__file__).parents[2] / "plugin/python/src"
+    settings = "--algorithm ppo --set arenas=8 --set worlds=2 --set ppo.num_steps=32 --steps"
+    variables = {"PLAYBOT": playbot, "PLAYBOT_PYTHON": sys.executable, "PYTHONPATH": sources, "GAME": GAME, "RUN": "run", "PORT": "6380"}
+    variables |= {"SLURM_JOB_NODELIST": "node[0-1]", "SLURM_CPUS_PER_TASK": 1, "TRAIN": f"{settings} 2048"}
+    variables["PATH"] = f"{folder / 'bin'}:{os.environ['PATH']}"
+    done = run(["bash", str(script)], folder, variables)
+    check("two nodes train", done.returncode == 0 and b"of 2 workers" in done.stderr)
+    again = run(["bash", str(script)], folder, variables)
+    check("a job that is queued again sees that all is done", again.returncode == 0 and b"is finished" in again.stderr)
+    alone = run([playbot, "train", GAME, *settings.split(), "2048", "--run", "alone"], folder, {})
+    same = (folder / "run/metrics.jsonl").read_bytes() == (folder / "alone/metrics.jsonl").read_bytes()
+    check("Slurm: the training is that of one process", alone.returncode == 0 and same)
+
+
+def kuberay(folder, playbot, _whole):
+    claim, job = yaml.safe_load_all((FILES / "kuberay.yaml").read_text())
+    cluster = job["spec"]["rayClusterSpec"]
+    groups = [cluster["headGroupSpec"], *cluster["workerGroupSpecs"]]
+    check("all pods have one image", len({group["template"]["spec"]["containers"][0]["image"] for group in groups}) == 1)
+    [volume] = groups[0]["template"]["spec"]["volumes"]
+    check("the run lies on the volume", volume["persistentVolumeClaim"]["claimName"] == claim["metadata"]["name"])
+    limits = [group["template"]["spec"]["containers"][0]["resources"]["limits"]["cpu"] for group in groups[1:]]
+    processors = sum(int(cpu) * group["replicas"] for cpu, group in zip(limits, groups[1:]))
+    check("as many workers as processors", job["spec"]["entrypoint"].count(f"--workers {processors}") == 2)
+    # Only the place and the sizes differ here.
+    entry = job["spec"]["entrypoint"].replace("/runs/", f"{folder}/").replace("--cluster ray", "--cluster processes")
+    entry = entry.replace(f"--workers {processors}", "--workers 2").replace("arenas=512", "arenas=8 --set worlds=2 --steps 2048")
+    program(folder / "bin/playbot", f'#!/bin/sh\nexec "{playbot}" "$@"\n')
+    variables = {"PATH": f"{folder / 'bin'}:{os.environ['PATH']}"}
+    for what, words in [("begins", b"of 2 workers"), ("goes on", b"is finished")]:
+        done = run(["sh", "-c", entry], folder, variables)
+        check(f"KubeRay: the training {what}", done.returncode == 0 and words in done.stderr)
+
+
 def main():
     playbot = str(pathlib.Path(sys.argv[1]).resolve())
     folder = pathlib.Path(tempfile.mkdtemp(prefix="playbot-many-machines-"))
     whole = folder / "whole"
     one = [playbot, "test", GAME, "--levels", LEVELS, *TESTERS.split(), "--out", str(whole)]
     check("one process has findings", run(one, folder, {}).returncode == FINDINGS)
-    for of_one in (github, kubernetes, slurm):
+    for of_one in (github, kubernetes, slurm, slurm_train, kuberay):
         own = folder / of_one.__name__
         own.mkdir()
         of_one(own, playbot, whole)

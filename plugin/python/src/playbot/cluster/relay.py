@@ -9,6 +9,7 @@ import json
 import os
 import pathlib
 import queue
+import re
 import struct
 import subprocess
 import sys
@@ -19,25 +20,32 @@ from playbot.cluster.start import report, start
 PROTOCOL = 1
 ALL = 2**32 - 1
 HELLO, SETUP, WEIGHTS, PLAY, PLAYED, LOST, FAILED = 1, 2, 3, 4, 5, 6, 7
-HEAD = struct.Struct("<IBI")
+# Length, kind and worker.
+HEAD = "<IBI"
 # Of what a program says, this much is kept.
 LAST_WORDS = 4000
 
 
 def write(stream, kind, worker, content):
-    stream.write(HEAD.pack(len(content) + 5, kind, worker))
+    stream.write(struct.pack(HEAD, len(content) + 5, kind, worker))
     stream.write(content)
     stream.flush()
 
 
 def read(stream):
     """The next message as kind, worker and content; None at the end."""
-    head = stream.read(HEAD.size)
-    if len(head) < HEAD.size:
+    head = stream.read(struct.calcsize(HEAD))
+    if len(head) < struct.calcsize(HEAD):
         return None
-    length, kind, worker = HEAD.unpack(head)
+    length, kind, worker = struct.unpack(HEAD, head)
     content = stream.read(length - 5)
     return (kind, worker, content) if len(content) == length - 5 else None
+
+
+def first_words(error):
+    """What an error of Ray says, without colours: its first line, or the last one of an actor that could not begin."""
+    lines = re.sub("\x1b\\[[0-9;]*m", "", str(error)).strip().splitlines() or [type(error).__name__]
+    return lines[-1 if "creation task" in lines[0] else 0].strip()
 
 
 class Died(Exception):
@@ -88,6 +96,8 @@ class Relay:
         import ray
 
         self.ray = ray
+        # Its code travels along, so that the machines of workers need Ray and the program alone.
+        ray.cloudpickle.register_pickle_by_value(sys.modules[__name__])
         self.program, self.out = program, out
         self.actor = ray.remote(num_cpus=1, max_restarts=0)(Worker)
         # Newest setup and weights, which a replacement needs, too.
@@ -134,7 +144,8 @@ class Relay:
             write(self.out, PLAYED, worker, done.result())
             return
         died = getattr(error, "cause", None)
-        why = str(died) if isinstance(died, Died) else f"Ray says: {str(error).strip().splitlines()[0]}"
+        # The class has travelled, too.
+        why = str(died) if type(died).__name__ == Died.__name__ else f"Ray says: {first_words(error)}"
         self.lives[worker] += 1
         try:
             self.ray.kill(self.actors[worker])

@@ -19,8 +19,8 @@ try:
 except ImportError:  # Windows has no such locks; there a second process is refused instead.
     fcntl = None
 
-# Exit codes of the program.
-PASSED, FINDINGS, FAILED, STOPPED = 0, 1, 2, 130
+# Exit codes of the program; the last three after the signals INT, TERM and HUP.
+PASSED, FINDINGS, FAILED, STOPPED = 0, 1, 2, (130, 143, 129)
 # Seconds between two looks at the progress.
 LOOK = 2.0
 # Of what a program that failed has said, this much is printed.
@@ -50,7 +50,7 @@ def dies_with(parent):
         if libc:
             libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
             if os.getppid() != parent:
-                os._exit(STOPPED)
+                os._exit(STOPPED[0])
 
     return prepare
 
@@ -74,7 +74,7 @@ def play(words, folder, where):
         words, cwd=where, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, **options
     )
     said = done.stderr.decode(errors="replace")[-LAST_WORDS:]
-    if done.returncode < 0 or done.returncode == STOPPED:
+    if done.returncode < 0 or done.returncode in STOPPED:
         raise Interrupted(f"{shlex.join(words)} was stopped ({done.returncode}):\n{said}")
     return done.returncode, said
 
@@ -99,6 +99,8 @@ def test_shards(args):
     except Exception as error:  # noqa: BLE001, whatever Ray raises is told in one line
         report(f"Ray cannot be reached: {type(error).__name__}: {error}")
         return FAILED
+    # Its code travels along, so that the machines of workers need Ray and the program alone.
+    ray.cloudpickle.register_pickle_by_value(sys.modules[__name__])
     retries = {"max_retries": args.retries, "retry_exceptions": [Interrupted]}
     task = ray.remote(num_cpus=1, **retries)(play)
     calls = [command(args, index) for index in range(args.shards)]
