@@ -5,11 +5,11 @@
 //! them. A hinge of this ant carries a rotor of 1 kg·m² while a limb has 0.01 kg·m². rapier's impulse joints with a
 //! motor in the rotor's place reach 40 % of the right joint speed at 4 solver iterations and 75 % at 16. Its multibody
 //! joints, which support rotors, let the ant rest at 0.49 m instead of 0.37 m and take ten times as long. rapier is
-//! used here to hold floor and walls, find those nearby, and answer rays ([`walls`]).
+//! used here to hold floor and walls, find those nearby, and answer rays ([`Walls`]).
 //!
-//! The parts, from the bottom: [`skeleton`] has the measures, [`kinematics`] the pose, [`dynamics`] the mass matrix and
-//! the forces without contacts. [`contact`] finds contacts, [`constraint`] turns joint limits
-//! and contacts into accelerations, [`body`] integrates. [`pilot`] is the shipped walking policy, [`view`] draws ants.
+//! The parts, from the bottom: [`skeleton`] has the measures and the state, [`kinematics`] the pose, [`dynamics`] the mass
+//! matrix and the forces without contacts. [`contact`] finds contacts, [`constraint`] turns joint limits and contacts into
+//! accelerations, [`body`] integrates. [`pilot`] is the shipped walking policy, [`view`] draws ants.
 
 pub mod body;
 pub mod constraint;
@@ -18,14 +18,11 @@ pub mod dynamics;
 pub mod kinematics;
 pub mod pilot;
 pub mod skeleton;
-pub mod state;
 pub mod view;
 pub mod walk;
-pub mod walls;
 
 use crate::ant::{
-    skeleton::{ACTUATED, JOINTS},
-    state::{joint_names, names},
+    skeleton::{ACTUATED, JOINTS, joint_names, names},
     view::{AntPicturePlugin, VIEW},
     walk::{Task, Walker, key_bindings, observe, start_episode, steer, walk},
 };
@@ -40,10 +37,9 @@ use std::sync::{Arc, LazyLock};
 
 pub use crate::ant::{
     body::{AntBody, PARTS, Part},
-    contact::WallBox,
+    contact::{WallBox, Walls},
     pilot::{Pilot, PilotError},
-    state::AntState,
-    walls::Walls,
+    skeleton::AntState,
 };
 
 /// Control steps per second.

@@ -9,14 +9,13 @@
 //! - [`tile`] and [`level`]: the grid, and a level on it; [`generator`]: levels from a mode and a seed.
 //! - [`rules`]: the steps of play; [`sim`]: an episode without an engine.
 //! - [`components`] and `play`: a level as entities, and the tick; [`physics`]: colliders for sensors.
-//! - [`view`], `cells` and [`paths`]: what an agent observes.
+//! - [`view`] and [`paths`]: what an agent observes.
 //! - [`planner`] and `demonstrator_bot`: plans to the coin, and the bot that follows them; `proof`: proofs about
 //!   levels.
 //! - [`picture`]: what sensors and people see.
-//! - [`text`], `level_text` and `show_level`: levels as text, as files, and on the command line.
+//! - [`text`] and `level_text`: levels as text, and as files and on the command line.
 //! - `detectors` and `defects`: the game's own detectors, and the defects that can be planted.
 
-mod cells;
 pub mod components;
 mod defects;
 mod demonstrator_bot;
@@ -31,7 +30,6 @@ pub mod planner;
 mod play;
 mod proof;
 pub mod rules;
-mod show_level;
 pub mod sim;
 pub mod text;
 pub mod tile;
@@ -176,7 +174,7 @@ impl LevelTools for CoinRun {
     }
 
     fn show(&self, request: &LevelRequest) -> Option<Result<LevelView, InspectError>> {
-        Some(show_level::show(self, request))
+        Some(level_text::show(self, request))
     }
 }
 

@@ -6,9 +6,9 @@
 //!
 //! The folder, in reading order:
 //!
-//! - `walls`: walls and free cells in rows; `text`: mazes as text.
+//! - `rows`: walls and free cells in rows, and mazes as text.
 //! - `map` and [`fixed`]: the map of a mode, and the maps of the literature.
-//! - `spec` and `generator`: size and shape of generated mazes, and mazes from a seed.
+//! - `generator`: size and shape of generated mazes, and mazes from a seed.
 //! - [`planner`]: best moves to a goal, distances and proofs.
 //! - [`show_level`]: a maze on the command line.
 //! - `error`: errors of mazes; `defects`: the defects that games in mazes share.
@@ -19,24 +19,21 @@ pub mod fixed;
 mod generator;
 mod map;
 pub mod planner;
+mod rows;
 pub mod show_level;
-mod spec;
-mod text;
-mod walls;
 
-use crate::maze::{generator::Draw, walls::Walls};
+use crate::maze::{generator::Draw, rows::Walls};
 use bevy_playbot::state_hash::StateHash;
 use serde::{Deserialize, Serialize};
 use std::{fmt, ops::RangeInclusive};
 
-pub(crate) use crate::maze::walls::reward_mismatch;
+pub(crate) use crate::maze::rows::reward_mismatch;
 pub use crate::maze::{
     error::{MAX_CELLS, MAX_SIDE, MazeError},
-    generator::generate,
+    generator::{HELD_OUT_SEEDS, MazeModeError, MazeSpec, OptionError, TRAIN_SEEDS, generate, read_mode},
     map::Map,
     planner::{Distances, GridMove, Planner},
-    spec::{HELD_OUT_SEEDS, MazeModeError, MazeSpec, OptionError, TRAIN_SEEDS, read_mode},
-    text::read_maze,
+    rows::read_maze,
 };
 
 /// Walls and free cells in rows, closed all around, with a start and a goal.

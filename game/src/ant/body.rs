@@ -4,12 +4,10 @@ use crate::ant::{
     constraint,
     constraint::{ConstraintRow, ConstraintSolver, Mobility},
     contact,
-    contact::{Contact, WallBox},
+    contact::{Contact, WallBox, Walls},
     dynamics::{Coordinates, GRAVITY, bias, mass_matrix},
     kinematics::{Pose, Solids, turn},
-    skeleton::{ACTUATED, HINGE_DAMPING, JOINTS, LEGS, LIMB_RADIUS, TORQUE, TORSO_RADIUS},
-    state::AntState,
-    walls::Walls,
+    skeleton::{ACTUATED, AntState, HINGE_DAMPING, JOINTS, LEGS, LIMB_RADIUS, TORQUE, TORSO_RADIUS},
 };
 use bevy::{
     math::{DQuat, DVec3, Quat, Vec3},

@@ -1,9 +1,6 @@
 //! The walker that comes with the program: a policy, trained in the game `ant`, that walks in a commanded direction.
 
-use crate::ant::{
-    skeleton::JOINTS,
-    state::{AntState, SENSES, senses},
-};
+use crate::ant::skeleton::{AntState, JOINTS, SENSES, senses};
 use bevy::math::Vec2;
 use playbot_assets::ANT_WALKER;
 use playbot_learner::{ActionValue, DeviceKind, FileError, LearnError, Policy, PolicyFile};

@@ -3,8 +3,7 @@
 use crate::ant::{
     body::AntBody,
     pilot::{Pilot, PilotInput},
-    skeleton::JOINTS,
-    state::{AntState, senses},
+    skeleton::{AntState, JOINTS, senses},
 };
 use bevy::prelude::*;
 use bevy_playbot::{agent::AgentOrder, fault::Faults};

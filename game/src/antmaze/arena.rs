@@ -3,7 +3,7 @@
 use crate::{
     ant::{
         AntBody, AntState,
-        state::joint_names,
+        skeleton::joint_names,
         walk::{AntComponent, torques},
     },
     antmaze::{

@@ -3,7 +3,7 @@
 use crate::{
     ant::{
         AntState,
-        state::{POSITIONS, VELOCITIES},
+        skeleton::{POSITIONS, VELOCITIES},
     },
     antmaze::{
         geometry::{cell_at, centre_of},

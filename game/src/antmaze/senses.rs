@@ -1,7 +1,7 @@
 //! AntMaze with more observations: goal and rays, a map, or positional encoding.
 
 use crate::{
-    ant::walls::Walls,
+    ant::contact::Walls,
     antmaze::{
         AntMaze, arena,
         arena::{InMaze, MazeAnt},

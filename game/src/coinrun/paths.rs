@@ -15,8 +15,7 @@
 //!
 //! The folder, in reading order:
 //!
-//! - `ground`: tiles and crates around a player, and the buttons of paths.
-//! - `sweep`: a step that nothing blocks.
+//! - `ground`: tiles and crates around a player, the buttons of paths, and a step that nothing blocks.
 //! - `slide`: a step beside straight walls and over level ground, and the choice among all ways of stepping.
 //! - `plain`: the paths without short cuts, for tests.
 
@@ -24,13 +23,9 @@ mod ground;
 #[cfg(test)]
 mod plain;
 mod slide;
-mod sweep;
 
 use crate::coinrun::{
-    paths::{
-        ground::{NearCrates, PathGround},
-        sweep::Swept,
-    },
+    paths::ground::{NearCrates, PathGround, Swept},
     rules::{Body, CoinRunEnd, OVERLAP_MARGIN, PlayerState, is_supported, motion::touch},
     tile::{Corners, REACH, TileGrid},
 };

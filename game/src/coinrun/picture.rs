@@ -6,13 +6,11 @@
 //!
 //! The folder, in reading order:
 //!
-//! - `art`: the drawings, and the positions of figures on them.
+//! - `art`: the drawings, those of puffs among them, and the positions of figures on them.
 //! - `animate`: updates of sprites: positions, poses, directions.
-//! - `puffs`: the drawing of the puffs that enemies leave behind.
 
 mod animate;
 mod art;
-mod puffs;
 
 use crate::{
     coinrun::{

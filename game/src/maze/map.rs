@@ -3,8 +3,7 @@
 use crate::maze::{
     Maze,
     error::MazeError,
-    generator::generate,
-    spec::{MazeModeError, MazeSpec, OptionError},
+    generator::{MazeModeError, MazeSpec, OptionError, generate},
 };
 use bevy_playbot::unknown_name::UnknownName;
 use std::{fmt, str::FromStr};

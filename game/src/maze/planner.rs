@@ -1,6 +1,6 @@
 //! Best moves to a goal from everywhere, by the values of moves.
 
-use crate::maze::{Cell, Maze, walls::Walls};
+use crate::maze::{Cell, Maze, rows::Walls};
 use playbot_harness::detector::LevelProof;
 use std::collections::VecDeque;
 

@@ -68,8 +68,6 @@ pub use crate::command_line::{check_usage, main};
 #[doc = include_str!("../README.md")]
 struct Readme;
 
-pub mod prelude;
-
 pub use playbot_bridge as bridge;
 pub use playbot_harness as harness;
 pub use playbot_learner as learner;
@@ -80,3 +78,13 @@ pub use playbot_train as train;
 
 pub use playbot_harness::{foreign::ForeignGame, game::Game};
 pub use playbot_test::assertions::{LevelTest, test};
+
+/// The items that the bots and tests of a game need, in one import.
+pub mod prelude {
+    pub use bevy_playbot::episode::EpisodeEnd;
+    pub use bevy_playbot::virtual_input::PointerPosition;
+    pub use playbot_harness::floor_plan::FloorPlan;
+    pub use playbot_harness::foreign::{ForeignGame, LevelFromFile, LevelSeed, PlayedAgent, PlayedMode, Restart};
+    pub use playbot_harness::prelude::*;
+    pub use playbot_test::assertions::LevelTest;
+}

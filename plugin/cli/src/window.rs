@@ -10,33 +10,35 @@
 //!
 //! The folder, in reading order:
 //!
-//! - `deciders`: the deciders in a window: the person, and the autopilot.
-//! - `playlist`: the order of the levels, and the result of the last episode.
-//! - `keys`: the window's own keys; `unbound`: keys of the person that no action holds; `devices`: the person's devices, kept from the game or handed on to it.
+//! - `session`: the deciders in a window, who are the person and the autopilot; the order of the levels, and the result of
+//!   the last episode.
+//! - `keys`: the window's own keys; `devices`: the person's devices, kept from the game or handed on to it.
 //! - `camera`: the person's view from above; `solid`: the view in space.
 //! - `overlay`: what the agent does, over the picture.
 //! - `teaching`: F9 and F10, recordings and lessons.
-//! - `notice`: a notice in the title; `title`: the window's title, and pauses of game time.
+//! - `notice`: notices in the title, and keys of the person that no action holds; `title`: the window's title, and pauses
+//!   of game time.
 //! - `frames`: windows of games whose ticks are frames.
-//! - `ending`: the orderly end, after which the recording is whole; `error`: errors of opening and running.
+//! - `ending`: the orderly end, after which the recording is whole, and errors of opening and running.
 
 mod camera;
-mod deciders;
 mod devices;
 mod ending;
-mod error;
 mod frames;
 mod keys;
 mod notice;
 mod overlay;
-mod playlist;
+mod session;
 #[cfg(feature = "view3d")]
 mod solid;
 mod teaching;
 mod title;
-mod unbound;
 
-use crate::window::{deciders::Deciders, ending::Verdict, error::catch, teaching::Teaching};
+use crate::window::{
+    ending::{Verdict, catch},
+    session::Deciders,
+    teaching::Teaching,
+};
 use bevy::{
     app::{PanicHandlerPlugin, PluginGroupBuilder, TerminalCtrlCHandlerPlugin},
     prelude::*,
@@ -66,7 +68,10 @@ use playbot_harness::{
 use std::time::Duration;
 
 pub use crate::window::{
-    deciders::Autopilot, error::WindowError, playlist::Playlist, teaching::TeachingSetup, unbound::UnboundKeys,
+    ending::WindowError,
+    notice::UnboundKeys,
+    session::{Autopilot, Playlist},
+    teaching::TeachingSetup,
 };
 
 /// Width and height of the window at first: eleven pixels for each of the bots' 64.
@@ -123,17 +128,17 @@ impl GameWindow {
             crate::window::solid::build(&mut app, game);
         }
         ending::build(&mut app, stop);
-        deciders::build(&mut app);
+        session::build_own_keys(&mut app);
         keys::build(&mut app);
         if has_space_view && cfg!(not(feature = "view3d")) {
             keys::excuse_view(&mut app);
         }
         title::build_pace(&mut app);
-        playlist::build(&mut app, game.tools().host.time_limit());
+        session::build_last_episode(&mut app, game.tools().host.time_limit());
         title::build(&mut app, game.name(), Update);
         overlay::build(&mut app, game, agent);
         let unbound = UnboundKeys::new(game);
-        unbound::build(&mut app, unbound.clone());
+        notice::build(&mut app, unbound.clone());
         Ok(Self { app, agent, unrecorded: None, unbound })
     }
 
@@ -172,10 +177,10 @@ impl GameWindow {
         }
         ending::build(&mut app, stop);
         frames::build(&mut app, game.name(), hz);
-        playlist::build(&mut app, game.tools().host.time_limit());
+        session::build_last_episode(&mut app, game.tools().host.time_limit());
         overlay::build(&mut app, game, agent);
         let unbound = UnboundKeys::new(game);
-        unbound::build(&mut app, unbound.clone());
+        notice::build(&mut app, unbound.clone());
         Ok(Self { app, agent, unrecorded, unbound })
     }
 

@@ -17,25 +17,20 @@
 //!
 //! The folder, in reading order:
 //!
-//! - `numbers`: the numbers of a level that are compared, and the tries of people on it.
 //! - `rank`: rank correlations, Spearman's and Kendall's.
 //! - `page`: the page of a calibration, as HTML with charts and as Markdown.
 
-mod numbers;
 mod page;
 mod rank;
 
-use crate::calibration::{
-    numbers::{LevelTries, Try},
-    page::LevelNames,
-};
+use crate::calibration::page::LevelNames;
 use bevy_playbot::{
-    demo::file::{Decider, DemoEpisode, DemoFileError, DemoHeader, DemoReader},
+    demo::file::{Decider, DemoEnd, DemoEpisode, DemoFileError, DemoHeader, DemoReader},
     engine::find_demos,
 };
 use playbot_harness::{game::Game, level_files::LevelFileError, split::LevelSplit};
-use playbot_report::counted;
-use playbot_test::verdict::{LevelVerdict, ResultLines, TestError, TestRecord};
+use playbot_report::{counted, statistics::median};
+use playbot_test::verdict::{EpisodeScore, LevelVerdict, ResultLines, TestError, TestRecord};
 use serde::Serialize;
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -43,10 +38,7 @@ use std::{
 };
 use thiserror::Error;
 
-pub use crate::calibration::{
-    numbers::LevelNumbers,
-    rank::{RankCorrelation, kendall, spearman},
-};
+pub use crate::calibration::rank::{RankCorrelation, kendall, spearman};
 
 /// Most levels that the error of no shared level names.
 const MOST_NAMED: usize = 4;
@@ -438,8 +430,108 @@ fn why(left_out: &[String]) -> String {
     if left_out.is_empty() { String::new() } else { format!(" ({})", left_out.join(", ")) }
 }
 
+// The numbers of a level that are compared, and the tries of people on it.
+
+/// The results of a tester, or of people, on a level.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LevelNumbers {
+    /// Episodes.
+    pub tries: u64,
+    /// Share of the tries that reached the goal.
+    pub completion: f64,
+    /// Median ticks of the tries that reached it, if there are any.
+    pub ticks: Option<f64>,
+    /// Deaths in a try: the share of tries that the game ended before the goal.
+    pub deaths: f64,
+}
+
+impl LevelNumbers {
+    /// Returns the numbers of a tester.
+    fn of_score(score: &EpisodeScore) -> Self {
+        let share = |count: u64| if score.episodes == 0 { 0.0 } else { count as f64 / score.episodes as f64 };
+        Self {
+            tries: score.episodes,
+            completion: share(score.solved),
+            ticks: score.ticks.map(|ticks| ticks.median),
+            deaths: share(score.lost),
+        }
+    }
+
+    /// Returns the numbers of several people: means, and the median of their times.
+    fn of_people(people: &[Self]) -> Self {
+        let mean = |value: fn(&Self) -> f64| people.iter().map(value).sum::<f64>() / people.len().max(1) as f64;
+        Self {
+            tries: people.iter().map(|person| person.tries).sum(),
+            completion: mean(|person| person.completion),
+            ticks: median(people.iter().filter_map(|person| person.ticks).collect()),
+            deaths: mean(|person| person.deaths),
+        }
+    }
+}
+
+/// Tries on one level, by person.
+#[derive(Clone, Debug, Default)]
+struct LevelTries(BTreeMap<String, Vec<Try>>);
+
+impl LevelTries {
+    /// Adds a try.
+    pub fn add(&mut self, person: &str, one: Try) {
+        self.0.entry(person.to_owned()).or_default().push(one);
+    }
+
+    /// Returns the names of the people.
+    pub fn people(&self) -> impl Iterator<Item = &str> {
+        self.0.keys().map(String::as_str)
+    }
+
+    /// Returns the numbers of these people.
+    pub fn numbers(&self) -> LevelNumbers {
+        let people: Vec<LevelNumbers> = self.0.values().map(|tries| of_person(tries)).collect();
+        LevelNumbers::of_people(&people)
+    }
+}
+
+fn of_person(tries: &[Try]) -> LevelNumbers {
+    let share = |end: TryEnd| tries.iter().filter(|one| one.end == end).count() as f64 / tries.len().max(1) as f64;
+    let completed = tries.iter().filter(|one| one.end == TryEnd::Completed);
+    LevelNumbers {
+        tries: tries.len() as u64,
+        completion: share(TryEnd::Completed),
+        ticks: median(completed.map(|one| one.ticks as f64).collect()),
+        deaths: share(TryEnd::Died),
+    }
+}
+
+/// A try with a known end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Try {
+    end: TryEnd,
+    ticks: u64,
+}
+
+impl Try {
+    /// Returns the try; `None` for an episode that was left before its end, since its outcome is unknown.
+    pub fn of(episode: &DemoEpisode) -> Option<Self> {
+        let end = match episode.end {
+            DemoEnd::Terminated { success: true } => TryEnd::Completed,
+            DemoEnd::Terminated { success: false } => TryEnd::Died,
+            DemoEnd::Truncated => TryEnd::TimedOut,
+            DemoEnd::Aborted => return None,
+        };
+        Some(Self { end, ticks: episode.len() as u64 })
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum TryEnd {
+    Completed,
+    Died,
+    TimedOut,
+}
+
 #[cfg(test)]
 mod tests {
+
     use super::*;
 
     /// Levels on which people and a tester complete these shares.
@@ -472,5 +564,13 @@ mod tests {
         let found = agreement(&ten, &other);
         assert_eq!((found.note, found.levels), (None, 10));
         assert!(found.spearman.is_some_and(|found| found.interval.is_some()));
+    }
+
+    #[test]
+    fn each_person_counts_once() {
+        let person = |tries, completion, ticks, deaths| LevelNumbers { tries, completion, ticks, deaths };
+        let all = [person(9, 1.0, Some(30.0), 0.0), person(1, 0.0, None, 1.0), person(2, 0.5, Some(50.0), 0.5)];
+        assert_eq!(LevelNumbers::of_people(&all), person(12, 0.5, Some(40.0), 0.5));
+        assert_eq!(LevelNumbers::of_people(&all[1..2]), all[1]);
     }
 }

@@ -7,18 +7,17 @@
 //!
 //! The folder, in reading order:
 //!
-//! - `record`: the record of a score: set, games, testers and settings.
+//! - `record`: the record of a score: set, games, testers and settings; and the journal of finished jobs, beside the file
+//!   of the score.
 //! - `contestant`: the testers that are scored, the clocks for their jobs, and the detectors that they share.
 //! - `playing`: the jobs: testers that play, and testers that explore.
 //! - `found`: the rules that decide which defects were found.
-//! - `journal`: the journal of finished jobs, beside the file of their score.
 //! - `table` and `mix`: the table that joins several scores, and the mixes of testers that find most together.
 //! - `error`: errors of scoring testers.
 
 mod contestant;
 mod error;
 mod found;
-mod journal;
 mod mix;
 mod playing;
 mod record;
@@ -62,8 +61,7 @@ pub use crate::score::{
     contestant::{ClockKind, Contestant, ContestantRecord, EXPLORE, EXPLORE_SKILLS, HOLD, Means, RANDOM},
     error::ScoreError,
     found::{FAR, FEWEST_SOUND, Found, RELIABLE, ScoredJob, judge},
-    journal::ScoreJournal,
-    record::{GameRecord, SCORE_FORMAT, ScoreBudget, ScoreRecord, SetRecord, Subject, SubjectKind},
+    record::{GameRecord, SCORE_FORMAT, ScoreBudget, ScoreJournal, ScoreRecord, SetRecord, Subject, SubjectKind},
     table::{ClassRow, FEW_FALSE, ScoreTable, Share, TesterRow},
 };
 

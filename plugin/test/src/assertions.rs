@@ -44,16 +44,14 @@
 //!
 //! The files of the folder, in reading order:
 //!
-//! - `testers`: the testers of an assertion, by name.
-//! - `examine`: the run of the testers over the levels, and the failure message.
+//! - `examine`: the testers of an assertion, by name, their run over the levels, and the failure message.
 //! - `assert_recordings`: assertions about recordings and findings.
 
 mod assert_recordings;
 mod examine;
-mod testers;
 
 use crate::{
-    assertions::testers::Named,
+    assertions::examine::Named,
     detectors::DetectorChoice,
     verdict::{LevelOutcome, LevelVerdict},
 };
@@ -65,7 +63,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-pub use crate::assertions::testers::LevelTestError;
+pub use crate::assertions::examine::LevelTestError;
 
 /// The program in the commands of a failure, unless another is named.
 const DEFAULT_PROGRAM: &str = "playbot";

@@ -33,8 +33,7 @@
 //! - `round`: [`explore`], and the check of a requested cell.
 //! - `cell`: the cells, and the grid over a level.
 //! - `archive`: the archive, and one visit.
-//! - `known_paths`: the paths to cells, their replay, and the summary.
-//! - `snapshots`: snapshots on these paths.
+//! - `known_paths`: the paths to cells, their replay, snapshots on them, and the summary.
 //! - `tried`: the actions that were tried from each cell.
 //! - `played`: the cells that a player reaches in episodes of its own.
 
@@ -43,7 +42,6 @@ mod cell;
 mod known_paths;
 mod played;
 pub mod round;
-mod snapshots;
 mod tried;
 
 use crate::explore::archive::Archive;
@@ -71,10 +69,9 @@ pub(crate) use crate::explore::cell::{cells_between, reach};
 pub use crate::explore::{
     archive::ReachedCell,
     cell::{CellGrid, ExploredCell, NoCell},
-    known_paths::{ExplorationSummary, Route, follow_route, record_route},
+    known_paths::{ExplorationSummary, Route, SnapshotFault, follow_route, record_route},
     played::{PlayedCells, PlayedSummary},
     round::{Round, check_cell, explore, explore_until, open_cells},
-    snapshots::SnapshotFault,
     tried::Exhaustion,
 };
 

@@ -12,8 +12,8 @@
 //! The files of the folder, in reading order:
 //!
 //! - `plan`, `run`: the plan of a test, and the test.
-//! - `test_world`, `played`, `walk`, `track`: the World in which testers play, the result of an episode, and the walk
-//!   and the progress of its agent.
+//! - `test_world`, `played`, `walk`: the World in which testers play, the result of an episode with the progress of its
+//!   agent, and the walk of that agent.
 //! - `walked`, [`maps`]: the walks of a level, as maps.
 //! - `folder`, `results`, [`mod@merge`], `shard`: the folder of a test and its `results.json`, and parts of a test.
 //! - `compare`, `statistics`: the comparison with earlier results.
@@ -36,16 +36,14 @@ mod statistics;
 mod test_world;
 #[cfg(test)]
 mod testing;
-mod track;
 mod walk;
 mod walked;
 
 use crate::{
     findings::RecordedCourse,
     verdict::{
-        played::{Played, PlayedEnd},
+        played::{Played, PlayedEnd, common_stop, reached},
         run::{inspect, seen},
-        track::{common_stop, reached},
         walked::LevelVisits,
     },
 };
@@ -77,6 +75,7 @@ pub use crate::verdict::{
     merge::merge,
     pinned::PinnedFindings,
     plan::{TestPlan, TestRecord, TestedRun, Tester, TesterRecord},
+    played::{CommonStop, ReachedCells, StopKind},
     reports::{
         AGAINST, JUNIT, SUMMARY, action_search, comparable_command,
         issues::{IssueForm, issues},
@@ -86,7 +85,6 @@ pub use crate::verdict::{
     run::{TestEnd, TestObserver, run_tests, run_tests_keeping, test_in_turn},
     shard::{Shard, ShardError},
     statistics::{Trials, benjamini_hochberg, fisher_exact, wilson},
-    track::{CommonStop, ReachedCells, StopKind},
 };
 
 /// Squares along the longer side of a floor plan to which [`SquareEnds`]s are rounded.
@@ -561,7 +559,7 @@ mod tests {
     use super::*;
     use crate::{
         findings::CourseEnd,
-        verdict::{maps::LevelMaps, testing::verdict, track::Track},
+        verdict::{maps::LevelMaps, played::Track, testing::verdict},
     };
     use bevy_playbot::episode::EpisodeResult;
 

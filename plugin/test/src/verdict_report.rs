@@ -11,12 +11,11 @@
 //! The files of the folder, in reading order:
 //!
 //! - `selection`: the levels of the page, the worst ones first.
-//! - `gallery`: all levels as small pictures.
 //! - `cards`: findings as the game shows them, with the path up to each on the plan, around the tick
 //!   since which something is wrong.
 //! - `pairs`: changed levels, before and now.
 //! - `events`: events of all levels of one size, as layers.
-//! - `level_table`: the table of levels.
+//! - `levels`: the gallery of all levels as small pictures, and the table of levels.
 //! - `drawn`: the drawings of the levels in the table, and descriptions of walks.
 //! - `picture`, `reach`, `heat`, `clip`: the plan with the ends of episodes, what was reached, maps over it, and the path
 //!   of a failure.
@@ -27,9 +26,8 @@ mod clip;
 mod drawn;
 mod events;
 mod files;
-mod gallery;
 mod heat;
-mod level_table;
+mod levels;
 mod pairs;
 mod picture;
 mod reach;
@@ -49,8 +47,7 @@ use crate::{
         drawn::{Drawings, MOST_PICTURES, Plans},
         events::Events,
         files::PictureFiles,
-        gallery::gallery,
-        level_table::level_table,
+        levels::{gallery, level_table},
         pairs::pairs,
         selection::Selection,
     },

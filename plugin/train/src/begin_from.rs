@@ -4,10 +4,9 @@
 mod tests;
 
 use crate::{
-    ancestor::Ancestor,
     checkpoint::{Checkpoint, CheckpointChoice},
     experiment::{Algorithm, Experiment, LearnerKind},
-    run_dir::{OpenedRun, RunDir, RunError, RunInfo},
+    run_dir::{Ancestor, OpenedRun, RunDir, RunError, RunInfo},
     trainer::{TrainedLearner, Trainer},
 };
 use playbot_harness::{game::Game, held_out::HeldOut, sealed_file::file_checksum, sensors::GameSensors};

@@ -371,12 +371,12 @@ impl Crew {
         let Ok(Event { number, frame }) = self.events.recv() else {
             return Err(ClusterError::Gone("nothing can be heard of it".to_owned()));
         };
-        return match frame {
+        match frame {
             Some(Frame { kind: Kind::Failed, content, .. }) => {
                 Err(ClusterError::Gone(String::from_utf8_lossy(&content).into_owned()))
             }
             frame => Ok((number, frame)),
-        };
+        }
     }
 
     fn send_all(&mut self, kind: Kind, content: &[u8]) {

@@ -6,9 +6,9 @@
 //! The folder, in reading order:
 //!
 //! - `finding`: signs, findings and the diagnosis; `advice`: what to try, as commands and settings that exist.
-//! - `evidence`: all that checks read. `play`, `recordings`, `forced` and `networks` measure it, and `gather` puts it
+//! - `evidence`: all that checks read. `play`, `recordings` and `networks` measure it, and `gather` puts it
 //!   together.
-//! - `metrics`: checks of settings and metrics. `observation`, `agreement` (with `probe`), `actions`, `reward`, `demonstrations` and
+//! - `metrics`: checks of settings and metrics. `observation`, `agreement`, `actions`, `reward`, `demonstrations` and
 //!   `score`: checks of what was played, recorded and learned.
 
 mod actions;
@@ -17,13 +17,11 @@ mod agreement;
 mod demonstrations;
 pub mod evidence;
 pub mod finding;
-pub mod forced;
 pub mod gather;
 mod metrics;
 pub mod networks;
 mod observation;
 pub mod play;
-mod probe;
 pub mod recordings;
 mod reward;
 mod score;

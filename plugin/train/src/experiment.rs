@@ -5,8 +5,8 @@
 //! - `file`: experiment files in RON with their bases, and `--set`, which override one another key by key.
 //! - `keys`: the setting of each key, and messages about wrong ones.
 //! - `checks`: checks of an experiment, alone, against its game and against the machine's memory.
-//! - `lessons`: settings of the levels that a training plays: earlier lessons and their order.
-//! - `self_play`: settings of a training against rivals.
+//! - `levels_and_rivals`: settings of the levels that a training plays, which are earlier lessons and their order, and of
+//!   a training against rivals.
 //! - `error`: errors of experiment files and of `--set`, with their positions.
 //! - `page`: the reference page of all settings.
 
@@ -14,9 +14,8 @@ pub(crate) mod checks;
 pub(crate) mod error;
 pub mod file;
 pub(crate) mod keys;
-mod lessons;
+mod levels_and_rivals;
 pub mod page;
-mod self_play;
 
 use bevy_playbot::{
     unknown_name::UnknownName,
@@ -35,8 +34,7 @@ use std::{collections::BTreeSet, fmt, path::PathBuf, str::FromStr};
 
 pub use crate::experiment::{
     checks::ExperimentError,
-    lessons::{CurriculumConfig, CurriculumLesson, LevelOrder, LevelsConfig, MOST_SCORED},
-    self_play::SelfPlayConfig,
+    levels_and_rivals::{CurriculumConfig, CurriculumLesson, LevelOrder, LevelsConfig, MOST_SCORED, SelfPlayConfig},
 };
 pub use bevy_playbot::vision::ObservationKind;
 pub use playbot_assets::{ExperimentFile, PRESETS};

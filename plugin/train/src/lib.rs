@@ -14,7 +14,7 @@
 //! - [`train_run`]: a whole run ([`train_run::Training`]), with its folder ([`run_dir`]), checkpoints
 //!   ([`checkpoint`]), metrics ([`metrics_log`], [`tensorboard`]) and observer ([`run_observer`]).
 //! - [`self_play`]: a training against rivals, and their [`ladder`](self_play::ladder).
-//! - [`begin_from`]: the start of a run from another one, and its ancestry ([`ancestor`]).
+//! - [`begin_from`]: the start of a run from another one, and its ancestry ([`Ancestor`](run_dir::Ancestor)).
 //! - [`imitate`]: imitation of recordings, or of a demonstrator that is asked (DAgger).
 //! - [`policy_export`]: the one file that a game ships with.
 //! - [`lesson`]: from a recording to a policy that plays at once, and gets better.
@@ -22,7 +22,6 @@
 //! - [`runs`]: runs on disk, found and compared over seeds.
 //! - [`study`] and [`study_runner`]: variants of an experiment, each with every seed, and their tables.
 
-pub mod ancestor;
 pub mod begin_from;
 pub mod checkpoint;
 pub mod cluster;

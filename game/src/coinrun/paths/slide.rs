@@ -3,8 +3,7 @@
 use crate::coinrun::{
     paths::{
         Walker,
-        ground::PathGround,
-        sweep::{Sweep, Swept},
+        ground::{PathGround, Sweep, Swept},
     },
     rules::{PlayerState, PlayerStep, fall, is_supported, move_player, walk},
     tile::SIZE,

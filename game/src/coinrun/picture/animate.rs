@@ -4,8 +4,7 @@ use crate::coinrun::{
     components::{Arena, ArenaBody, Crate, Enemy, InArena, PlayerBody, PlayerMemory, PlaysIn, Saw},
     picture::{
         BLOCKS, PLAYER_HEIGHT, Scenery,
-        art::{Art, Pose},
-        puffs::{PUFFS, PuffRow},
+        art::{Art, PUFFS, Pose, PuffRow},
     },
     play::NOTHING,
     rules::{Body, JUMP_SPEED, PlayerState, WALK_SPEED, directions},

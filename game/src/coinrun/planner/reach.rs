@@ -7,18 +7,20 @@
 //!
 //! The folder, in reading order:
 //!
-//! - `bins`: sets of positions along x.
-//! - `ground`: answers about a level at one height.
+//! - `ground`: sets of positions along x, and answers about a level at one height.
 //! - `step`: one step with exact height and speed, for all positions at once.
 //! - `loose`: players that were stopped in the midst of a step.
 
-mod bins;
 mod ground;
 mod loose;
 mod step;
 
 use crate::coinrun::{
-    planner::reach::{bins::Bins, ground::ReachableGround, loose::out_of_wall, step::step},
+    planner::reach::{
+        ground::{Bins, ReachableGround},
+        loose::out_of_wall,
+        step::step,
+    },
     rules::corners,
     sim::Sim,
 };

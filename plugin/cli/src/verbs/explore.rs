@@ -1,10 +1,8 @@
 //! `playbot explore`.
 //!
-//! - `recorded`: recording of a path that was found.
-//! - `beside`: a policy's cells beside those of the exploration.
+//! - `results`: the recording of a path that was found, the picture of the cells, and a policy's cells beside them.
 
-mod beside;
-mod recorded;
+mod results;
 
 use crate::{
     arguments::{
@@ -20,10 +18,7 @@ use crate::{
     pictures::plot::{PlotFile, without_plan},
     progress,
     progress::interrupt,
-    verbs::explore::{
-        beside::{Beside, PlayedBeside},
-        recorded::{RecordingFile, chart},
-    },
+    verbs::explore::results::{Beside, PlayedBeside, RecordingFile, chart},
 };
 use bevy_playbot::{placement::TickPlacement, policy::ActionDraw, skill_prior::SkillPrior, vision::ObservationConfig};
 use playbot_harness::{

@@ -1,10 +1,9 @@
 //! `playbot skills`: one state of a level, and what the policy does from there with each skill.
 //!
-//! - `rollouts`: the state, and the rollout of a skill from it.
-//! - `page`: the page, its server on this machine, and the same page as a file.
+//! - `page`: the page, its server on this machine, and the same page as a file; the state, and the rollout of a skill
+//!   from it.
 
 mod page;
-mod rollouts;
 
 use crate::{
     arguments::{
@@ -14,10 +13,7 @@ use crate::{
     error::{CliError, Outcome},
     output::{self, print_line},
     progress::{self, interrupt},
-    verbs::skills::{
-        page::{Ask, Page},
-        rollouts::{Rollout, Rollouts},
-    },
+    verbs::skills::page::{Ask, Page, Rollout, Rollouts},
 };
 use bevy_playbot::{
     skill_prior::NamedSkill,

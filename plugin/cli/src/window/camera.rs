@@ -1,6 +1,6 @@
 //! The person's camera: the bots' square view, enlarged, with the player in the middle.
 
-use crate::window::deciders::Deciders;
+use crate::window::session::Deciders;
 use bevy::{
     camera::{ScalingMode, Viewport},
     prelude::*,

@@ -3,7 +3,7 @@
 //! Between two frames the window system writes its messages into empty lists, while those of the game are stashed. This
 //! keeps the person's input apart from virtual input, message by message.
 
-use crate::window::deciders::{OwnDevices, OwnKeys};
+use crate::window::session::{OwnDevices, OwnKeys};
 use bevy::{
     input::{
         ButtonState, InputSystems,

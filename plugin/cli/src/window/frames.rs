@@ -4,10 +4,11 @@
 //! recording would lack that.
 
 use crate::window::{
-    deciders::{Deciders, OwnDevices, OwnKeys},
     devices,
     devices::Devices,
-    ending, keys, title,
+    ending, keys,
+    session::{Deciders, OwnDevices, OwnKeys},
+    title,
     title::Pace,
 };
 use bevy::{

@@ -3,10 +3,9 @@
 use crate::window::{
     Playlist,
     camera::Zoom,
-    deciders::{Deciders, OwnKeys, OwnKeysRead},
     ending::Ending,
     notice::Notice,
-    playlist::leave_level,
+    session::{Deciders, OwnKeys, OwnKeysRead, leave_level},
     teaching::teach,
     title::Pace,
 };

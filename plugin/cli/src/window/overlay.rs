@@ -1,6 +1,6 @@
 //! The overlay of a window: names of actions and of the decider, the progress of the lesson, and notes of detectors.
 
-use crate::window::{deciders::Deciders, teaching::Teaching};
+use crate::window::{session::Deciders, teaching::Teaching};
 use bevy::prelude::*;
 use bevy_playbot::{
     agent::Control,

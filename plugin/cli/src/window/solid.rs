@@ -2,7 +2,7 @@
 
 use crate::window::{
     camera::Zoom,
-    deciders::{Deciders, OwnKeys, OwnKeysRead},
+    session::{Deciders, OwnKeys, OwnKeysRead},
 };
 use bevy::{
     camera::RenderTarget, core_pipeline::tonemapping::Tonemapping, prelude::*, transform::helper::TransformHelper,

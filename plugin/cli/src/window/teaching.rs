@@ -2,10 +2,9 @@
 //! learned so far.
 
 use crate::window::{
-    deciders::{Deciders, OwnKeys},
     notice::Notice,
-    playlist::leave_level,
     record_into,
+    session::{Deciders, OwnKeys, leave_level},
 };
 use bevy::prelude::*;
 use bevy_playbot::{

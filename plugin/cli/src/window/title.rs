@@ -2,9 +2,8 @@
 
 use crate::window::{
     Playlist,
-    deciders::Deciders,
     notice::{Notice, age_notice},
-    playlist::LastEpisode,
+    session::{Deciders, LastEpisode},
     teaching::Teaching,
 };
 use bevy::{

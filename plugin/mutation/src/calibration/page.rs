@@ -1,9 +1,7 @@
 //! The page of a calibration, as HTML with charts and as Markdown.
 
 use crate::{
-    calibration::{
-        Agreement, Calibration, CalibrationError, FEW_LEVELS, Measure, numbers::LevelNumbers, rank::RankCorrelation,
-    },
+    calibration::{Agreement, Calibration, CalibrationError, FEW_LEVELS, LevelNumbers, Measure, rank::RankCorrelation},
     scatter::draw_scatters,
 };
 use bevy_playbot::demo::file::{DemoEpisode, DemoHeader};

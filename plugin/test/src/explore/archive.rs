@@ -2,8 +2,7 @@
 
 use crate::explore::{
     cell::{ExploredCell, Spotted},
-    known_paths::{KnownPath, KnownPaths, Route},
-    snapshots::SPACING,
+    known_paths::{KnownPath, KnownPaths, Route, SPACING},
     tried::{Trial, TrialNotes, TriedActions},
 };
 use bevy::prelude::*;

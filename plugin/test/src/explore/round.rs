@@ -4,8 +4,7 @@ use crate::explore::{
     EndCounts, Exhaustion, Exploration, ExploreError, ExplorePlan, Stop, Until,
     archive::{Archive, Destination, Draws, Job, Visit, Visited},
     cell::{CellGrid, ExploredCell, Lookout, tile_size},
-    known_paths::Route,
-    snapshots::SnapshotFault,
+    known_paths::{Route, SnapshotFault},
 };
 use bevy::{
     math::{Rect, Vec2},

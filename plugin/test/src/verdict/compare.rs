@@ -10,9 +10,9 @@ use crate::{
         error::TestError,
         maps::{LevelMaps, MapScope},
         plan::{TestPlan, TestRecord, TesterRecord},
+        played::ReachedCells,
         results::ResultLines,
         statistics::{Trials, benjamini_hochberg, fisher_exact},
-        track::ReachedCells,
     },
 };
 use bevy::math::Vec2;

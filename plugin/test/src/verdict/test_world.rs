@@ -5,8 +5,7 @@ use crate::{
     findings::detector_of,
     verdict::{
         plan::Tester,
-        played::{EpisodeFinding, Played, PlayedEnd, Task},
-        track::{Track, TrackCounter},
+        played::{EpisodeFinding, Played, PlayedEnd, Task, Track, TrackCounter},
         walk::{Walk, WalkCounter},
     },
 };

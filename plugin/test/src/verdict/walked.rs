@@ -191,7 +191,7 @@ mod tests {
     use bevy_playbot::episode::EpisodeResult;
 
     use super::*;
-    use crate::verdict::{track::Track, walk::SquareCount};
+    use crate::verdict::{played::Track, walk::SquareCount};
 
     /// Makes a plan of four squares in a row and a wall.
     fn plan() -> FloorPlan {

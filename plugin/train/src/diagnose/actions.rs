@@ -4,8 +4,7 @@ use crate::diagnose::{
     advice::Advice,
     evidence::{Evidence, list},
     finding::{LearningFinding, Sign},
-    forced::ForcedAction,
-    play::{PlayedEpisode, Seat},
+    play::{ForcedAction, PlayedEpisode, Seat},
     recordings::RecordedSet,
 };
 use bevy_playbot::action::{ActionSpace, ActionValue};

@@ -3,9 +3,8 @@
 use crate::{
     diagnose::{
         advice::AdviceContext,
-        forced::ForcedAction,
         networks::{DecoderProbe, NetworkProbe},
-        play::{Played, Seat, mean},
+        play::{ForcedAction, Played, Seat, mean},
         recordings::RecordedSet,
     },
     experiment::{Experiment, LearnerKind},

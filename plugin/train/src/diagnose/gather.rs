@@ -4,10 +4,9 @@ use crate::{
     checkpoint::CheckpointChoice,
     diagnose::{
         evidence::Evidence,
-        forced::force,
         networks::{NetworkProbe, probe, probe_decoder},
         observation::note_constants,
-        play::{PlayPlan, PlayedEpisode, Seat, play},
+        play::{PlayPlan, PlayedEpisode, Seat, force, play},
         recordings::{RecordedEpisode, RecordedSet},
     },
     error::RunError,

@@ -6,8 +6,7 @@
 use crate::coinrun::{
     planner::reach::{
         Exact, Loose, State,
-        bins::{Bins, STEP_BINS},
-        ground::{ReachableGround, Touched},
+        ground::{Bins, ReachableGround, STEP_BINS, Touched},
         put,
     },
     rules::{GRAVITY, JUMP_SPEED, PLAYER_HALF_HEIGHT},

@@ -3,8 +3,7 @@
 use crate::coinrun::{
     planner::reach::{
         Exact, Loose, State,
-        bins::{Bins, STEP_BINS},
-        ground::ReachableGround,
+        ground::{Bins, ReachableGround, STEP_BINS},
         loose::out_of_wall,
         put,
     },

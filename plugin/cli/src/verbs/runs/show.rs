@@ -12,10 +12,10 @@ use playbot_learner::EntitySet;
 use playbot_report::{Chart, Curve, PlainTable, counted, readable, sparkline, to_svg, whole};
 use playbot_train::{
     Experiment,
-    ancestor::Ancestor,
     checkpoint::{Checkpoint, CheckpointSummary},
     diagnose::of_metrics,
     metrics_log::{EPISODIC_RETURN, SUCCESS_RATE, range_of},
+    run_dir::Ancestor,
     runs::{RunCurves, RunRecord, changed_settings, with_defaults},
     self_play::ladder::Ladder,
 };
