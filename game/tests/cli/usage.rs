@@ -48,7 +48,7 @@ fn wrong_names_are_usage_errors_with_the_nearest_right_one() {
         (&["bench", "coinrun", "--seconds", "inf"], "it must be a number, such as 0.5"),
         (&["eval", "--bot", "robot"], "unknown bot `robot`"),
         (&["level", "maze2d", "--map", "lrage"], "; and there is no file of that name"),
-        (&["policy", "export", "--out", "a.policy"], "<--run <RUN>|--skills <SKILLS>>"),
+        (&["policy", "export", "--out", "a.policy"], "<--run <RUN>|--skills <SKILLS>|--policy <POLICY>>"),
         (&["train", "--run", "r", "--skills", "no.safetensors"], "`playbot learn-skills --out no.safetensors`"),
         (&["train", "--run", "r", "--steps", "0"], "`steps=0`: must be at least 1\n"),
         (&["config", "show", "--experiment", "no.ron"], "`playbot config show --out no.ron`"),

@@ -70,8 +70,18 @@ pub fn policy_file(
     skills: Option<SkillSource>,
     provenance: Provenance,
 ) -> PolicyFile {
+    let metadata = policy_metadata(game, observation_config, provenance);
+    PolicyFile { metadata, policy, skills }
+}
+
+/// Returns the metadata of a policy for this game and these observations.
+pub fn policy_metadata(
+    game: &dyn Game,
+    observation_config: &ObservationConfig,
+    provenance: Provenance,
+) -> PolicyMetadata {
     let Provenance { algorithm, training, seen, code } = provenance;
-    let metadata = PolicyMetadata {
+    PolicyMetadata {
         game: game.name().to_owned(),
         game_version: game.version(),
         observations: if observation_config.is_image() { Vec::new() } else { game.observation().names },
@@ -81,8 +91,7 @@ pub fn policy_file(
         training,
         seen,
         code,
-    };
-    PolicyFile { metadata, policy, skills }
+    }
 }
 
 /// Writes a policy file. Its examples come from a short play on `levels`.
@@ -97,18 +106,48 @@ pub fn export_policy(
     seed: u64,
     path: &Path,
 ) -> Result<(), ExportError> {
+    let ExampleStates { obs, skills, count } = example_states(game, file, levels, seed, None)?;
+    Ok(file.save(path, &obs, &skills, count)?)
+}
+
+/// Observations out of a short play, with the skills that were active.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExampleStates {
+    /// `count` observations.
+    pub obs: Observations,
+    /// `count` times the width of a skill.
+    pub skills: Vec<f32>,
+    /// Number of observations.
+    pub count: usize,
+}
+
+/// Plays `levels` with a policy for a short time and returns `wanted` of the observations, or a few.
+///
+/// # Errors
+///
+/// [`ExportError`].
+pub fn example_states(
+    game: &dyn Game,
+    file: &PolicyFile,
+    levels: &LevelSplit,
+    seed: u64,
+    wanted: Option<usize>,
+) -> Result<ExampleStates, ExportError> {
     let prior = file.skills.as_ref().map(SkillPrior::from);
     let latent = file.policy.latent();
     let arenas = at_most(game, EXAMPLE_ARENAS);
-    let ticks = EXAMPLE_TICKS * EXAMPLE_ARENAS / arenas;
+    let ticks = match wanted {
+        None => EXAMPLE_TICKS * EXAMPLE_ARENAS / arenas,
+        Some(wanted) => wanted.saturating_mul(EXAMPLE_STRIDE).div_ceil(arenas),
+    };
     let mut collector = Collector::new(game, levels, &policy_observation(file)?, seed, 0, arenas as u32, prior)?;
     let (rollout, _) = collector.collect(&file.policy, latent, ticks)?;
-    let (mut obs, mut z) = (Observations::empty(&rollout.obs_kind), Vec::new());
-    let rows = (0..rollout.rows()).step_by(EXAMPLE_STRIDE);
-    let n = rows.len();
+    let (mut obs, mut skills) = (Observations::empty(&rollout.obs_kind), Vec::new());
+    let rows = (0..rollout.rows()).step_by(EXAMPLE_STRIDE).take(wanted.unwrap_or(usize::MAX));
+    let count = rows.len();
     for row in rows {
         obs.push(rollout.obs.row(row, rollout.obs_kind.numbers())).map_err(|error| Fault(error.to_string()))?;
-        z.extend_from_slice(&rollout.z[row * latent..(row + 1) * latent]);
+        skills.extend_from_slice(&rollout.z[row * latent..(row + 1) * latent]);
     }
-    Ok(file.save(path, &obs, &z, n)?)
+    Ok(ExampleStates { obs, skills, count })
 }

@@ -1,0 +1,5 @@
+//! Tests of export and import, over every kind of policy that the trainers make.
+
+mod exported;
+mod imported;
+mod kinds;
