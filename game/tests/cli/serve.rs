@@ -112,6 +112,7 @@ fn what_cannot_be_served_is_refused_before_a_socket_is_opened() {
     for (args, words) in [
         (&["serve", "coinrun", "--transport", "tcp", "--listen", "0.0.0.0:7000"][..], "take 127.0.0.1"),
         (&["serve", "coinrun", "--transport", "tcp", "--listen", "here"], "write 127.0.0.1:PORT"),
+        (&["serve", "coinrun", "--listen", "127.0.0.1:7000"], "add --transport tcp"),
         (&["serve", "coinrun", "--listen", "no/such/folder/socket"], "no/such/folder/socket"),
         (&["serve", "coinrun", "--levels", "hardest:0..9"], "hardest"),
         (&["serve", "coinrun", "--arenas", "0"], "--arenas"),

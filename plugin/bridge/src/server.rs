@@ -245,7 +245,7 @@ const LOOK: Duration = Duration::from_millis(20);
 const PATIENCE: u32 = 25;
 
 /// Looks for the only client, about a minute: whoever has started the server for it is gone.
-const LOOKS: u32 = 3000;
+const MOST_LOOKS: u32 = 3000;
 
 /// A server.
 pub struct Server<'a> {
@@ -273,7 +273,7 @@ impl Server<'_> {
             let Some(stream) = early.take().map_or_else(|| listener.client(), |stream| Ok(Some(stream)))? else {
                 thread::park_timeout(LOOK);
                 looks += 1;
-                if self.once && looks > LOOKS {
+                if self.once && looks > MOST_LOOKS {
                     (self.report)("no client has come, and only one was waited for");
                     break;
                 }
@@ -667,7 +667,7 @@ fn unknown(saved: u64) -> StepError {
 }
 
 /// Returns the newest picture of an observation `[channels, height, width]` as `[height, width, 3]`.
-fn by_pixels(image: &ImageOptions, planes: &[u8]) -> Vec<u8> {
+pub(crate) fn by_pixels(image: &ImageOptions, planes: &[u8]) -> Vec<u8> {
     let plane = (image.width * image.height) as usize;
     let colours = image.colours() as usize;
     let newest = &planes[planes.len().saturating_sub(colours * plane)..];

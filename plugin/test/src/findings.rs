@@ -49,7 +49,7 @@ use std::{
 use thiserror::Error;
 
 pub use crate::findings::{
-    checks::{Check, Checks, LOST, NOT_SOLVED},
+    checks::{Check, Checks, LOST, NOT_SOLVED, REPORT},
     course::{CourseEnd, RecordedCourse, course_of, course_of_recording, keeps_course},
     folder::{Date, DateError, FINDINGS, clear_findings, first_finding, gather_findings, list_findings},
     keep::{FindingFiles, KeptFailure, Played, Recheck, SeenFinding, SeenLevel, Sighting, recheck},

@@ -1,10 +1,10 @@
-//! A program whose game panics in a step of its start. The step is in the variable `BREAK`: `build`, `finish` or `start`.
-//! Without it, the game is sound.
+//! A program whose game panics in a step of its start, or while it is played. The step is in the variable `BREAK`: `build`,
+//! `finish`, `start`, or `edge` for the tick in which the paddle is at the right edge. Without it, the game is sound.
 
 use std::process::ExitCode;
 
 use bevy::prelude::*;
-use playbot_tests::foreign::catch::{adapted, game};
+use playbot_tests::foreign::catch::{Paddle, adapted, game};
 
 /// A plugin that panics in one of its steps.
 struct Fragile(String);
@@ -14,6 +14,9 @@ impl Plugin for Fragile {
         assert!(self.0 != "build", "no saved game");
         if self.0 == "start" {
             app.add_systems(Startup, open_door);
+        }
+        if self.0 == "edge" {
+            app.add_systems(Update, watch_edge);
         }
     }
 
@@ -25,6 +28,10 @@ impl Plugin for Fragile {
 #[inline(never)]
 fn open_door() {
     panic!("no saved game");
+}
+
+fn watch_edge(paddle: Single<&Transform, With<Paddle>>) {
+    assert!(paddle.translation.x < 8.0, "the paddle falls off the table");
 }
 
 fn main() -> ExitCode {

@@ -17,6 +17,7 @@ mod lessons;
 mod level_detectors;
 mod meadow;
 mod memories;
+mod models;
 mod one_world;
 mod orders;
 mod paused;

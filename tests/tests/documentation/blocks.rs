@@ -5,6 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use serde_json::Value;
+
 /// A document, the marker around its block, and the source that holds the block.
 pub const SHOWN: [(&str, &str, &str); 5] = [
     ("README.md", "adapter", "tests/tests/documentation/hand_made.rs"),
@@ -122,6 +124,15 @@ fn every_block_is_of_a_kind_that_is_checked() {
             let marker = above.strip_prefix("<!-- ").and_then(|rest| rest.strip_suffix(" -->")).unwrap_or_default();
             match language.as_str() {
                 "sh" | "ron" => {}
+                // Programs that a client of a language model starts.
+                "json" if block.contains("\"mcpServers\"") => {
+                    let servers: Value = serde_json::from_str(&block).expect("JSON");
+                    for (_, server) in servers["mcpServers"].as_object().expect("servers") {
+                        let args = server["args"].as_array().expect("a list").iter().filter_map(Value::as_str);
+                        let checked = playbot::check_usage(std::iter::once("playbot").chain(args));
+                        checked.unwrap_or_else(|error| panic!("{path}:{line}: {error}"));
+                    }
+                }
                 // Level files: see `level_files`.
                 "json" => assert_eq!(path, "docs/reference/level-formats.md", "line {line} is not read"),
                 // Dependencies: see `sources`.

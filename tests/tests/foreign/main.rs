@@ -10,6 +10,7 @@ mod faults;
 mod headless;
 mod lines;
 mod loading;
+mod models;
 mod namesakes;
 mod play;
 #[cfg(unix)]

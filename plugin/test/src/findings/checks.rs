@@ -64,6 +64,7 @@ impl Default for Checks {
             ("unreachable-goal", Check::Level(is_unreachable)),
             (LOST, Check::Episode(is_lost)),
             (NOT_SOLVED, Check::Episode(is_not_solved)),
+            (REPORT, Check::Episode(is_reported)),
         ];
         Self { checks, records: Vec::new(), asked: Vec::new() }
     }
@@ -112,6 +113,13 @@ fn is_not_solved(_: &FindingHead, replayed: &Replayed) -> Option<u32> {
     end.ticks.checked_sub(1)
 }
 
+/// Checks that the state which somebody has reported is there in the same tick. Whether it is wrong is for people to say.
+fn is_reported(head: &FindingHead, replayed: &Replayed) -> Option<u32> {
+    let tick = head.tick?;
+    let state = replayed.state_hashes.get(tick as usize);
+    (state.is_some() && state == head.state_hash.as_ref()).then_some(tick)
+}
+
 // Failed episodes as findings.
 
 /// The game ended the episode before the goal.
@@ -119,6 +127,9 @@ pub const LOST: &str = "lost";
 
 /// The time limit ended the episode before the goal.
 pub const NOT_SOLVED: &str = "not-solved";
+
+/// A tester has reported the state in its own words, such as a language model that plays.
+pub const REPORT: &str = "report";
 
 /// Returns the kind of an episode that ended before the goal, and its message; `None` if the goal was reached.
 pub(super) fn failure_of(end: &EpisodeResult) -> Option<(&'static str, String)> {
@@ -238,6 +249,18 @@ mod tests {
         let broken = Breakage { detector: "panic", tick: 4, message: head("panic").message };
         let broken = Replayed { broken: Some(broken), ..Replayed::default() };
         assert_eq!((found("panic", &broken), found("fault", &broken)), (Some(4), None));
+    }
+
+    #[test]
+    fn a_report_is_there_in_its_tick_with_its_state() {
+        let Some(Check::Episode(check)) = Checks::default().of(REPORT) else { panic!("it looks at episodes") };
+        let head = |tick, hash| FindingHead { tick, state_hash: hash, ..head(REPORT) };
+        let replayed = Replayed { state_hashes: vec![7, 8, 9], ..Replayed::default() };
+        assert_eq!(check(&head(Some(1), Some(8)), &replayed), Some(1));
+        for (tick, hash) in [(Some(1), Some(9)), (Some(3), Some(9)), (Some(1), None), (None, Some(8)), (Some(3), None)]
+        {
+            assert_eq!(check(&head(tick, hash), &replayed), None, "{tick:?} {hash:?}");
+        }
     }
 
     #[test]
