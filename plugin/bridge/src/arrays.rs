@@ -13,18 +13,20 @@
 //! ```
 
 use bevy_playbot::action::{ActionSpace, MixedSpace};
-use playbot_learner::{
-    ObsKind,
-    disk::{self, DiskFile},
-};
+use playbot_learner::ObsKind;
+#[cfg(unix)]
+use playbot_learner::disk::{self, DiskFile};
 use serde::Serialize;
+#[cfg(unix)]
+use std::{fs::OpenOptions, path::Path};
 use std::{
-    fs::OpenOptions,
     io,
-    path::{Path, PathBuf},
+    path::PathBuf,
     sync::{Mutex, MutexGuard, PoisonError},
 };
 use thiserror::Error;
+#[cfg(unix)]
+use vm_memory::{Bytes, FileOffset, VolatileMemory, mmap::MmapRegion};
 
 /// Type of the numbers of an array, in the byte order of x86 and ARM: the lowest byte first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -228,7 +230,7 @@ enum Place {
 #[derive(Debug, Error)]
 #[error("{}: no shared memory of {} KiB can be made there: {source}; make room, take fewer arenas, or let the arrays go \
          through the socket with `--transport unix`", path.display(), bytes.div_ceil(1024))]
-pub struct MemoryError {
+pub struct SharedMemoryError {
     path: PathBuf,
     bytes: usize,
     source: io::Error,
@@ -250,7 +252,7 @@ impl Memory {
     ///
     /// There is no room for it.
     #[cfg(unix)]
-    pub fn shared(layout: Layout, protocol: u32) -> Result<Self, MemoryError> {
+    pub fn shared(layout: Layout, protocol: u32) -> Result<Self, SharedMemoryError> {
         let file = SharedFile::new_in(&folder(), &layout, protocol)?;
         Ok(Self { layout, place: Place::Shared(file) })
     }
@@ -314,11 +316,12 @@ impl Memory {
     ///
     /// The file cannot be written.
     pub fn write(&self, slot: usize, offset: usize, bytes: &[u8]) -> io::Result<()> {
+        // Only a file has several places for results.
+        #[cfg_attr(not(unix), expect(unused_variables, reason = "there are no such files"))]
+        let in_file = HEAD + self.layout.action_bytes + slot * self.layout.result_bytes + offset;
         match &self.place {
             #[cfg(unix)]
-            Place::Shared(file) => {
-                file.write(HEAD + self.layout.action_bytes + slot * self.layout.result_bytes + offset, bytes)
-            }
+            Place::Shared(file) => file.write(in_file, bytes),
             Place::Message { results, .. } => {
                 lock(results)[offset..offset + bytes.len()].copy_from_slice(bytes);
                 Ok(())
@@ -351,13 +354,15 @@ fn folder() -> PathBuf {
 #[cfg(unix)]
 #[derive(Debug)]
 struct SharedFile {
-    file: DiskFile,
+    /// Kept open: its path may lead through this process.
+    _file: DiskFile,
+    mapped: MmapRegion,
     path: Mutex<Option<PathBuf>>,
 }
 
 #[cfg(unix)]
 impl SharedFile {
-    fn new_in(folder: &Path, layout: &Layout, protocol: u32) -> Result<Self, MemoryError> {
+    fn new_in(folder: &Path, layout: &Layout, protocol: u32) -> Result<Self, SharedMemoryError> {
         use std::os::unix::fs::OpenOptionsExt;
         let bytes = layout.bytes();
         let mut number = 0;
@@ -371,10 +376,18 @@ impl SharedFile {
                 opened => break (path, opened),
             }
         };
-        let refused = |source| MemoryError { path: path.clone(), bytes, source };
+        let refused = |source| SharedMemoryError { path: path.clone(), bytes, source };
         let file = opened.map_err(refused)?;
+        let zeros = vec![0; 1 << 16];
+        for at in (0..bytes).step_by(zeros.len()) {
+            let piece = &zeros[..zeros.len().min(bytes - at)];
+            // Where memory is full, this is refused. A mapping would end the program.
+            std::os::unix::fs::FileExt::write_all_at(file.as_file(), piece, at as u64).map_err(refused)?;
+        }
+        let mapped = file.as_file().try_clone().map(|file| MmapRegion::from_file(FileOffset::new(file, 0), bytes));
+        let mapped = mapped.map_err(refused)?.map_err(|error| refused(io::Error::other(error)))?;
         let shown = Some(nameless(&file, &path).unwrap_or_else(|| path.clone()));
-        let shared = Self { file, path: Mutex::new(shown) };
+        let shared = Self { _file: file, mapped, path: Mutex::new(shown) };
         let head = [
             protocol,
             layout.checksum(),
@@ -384,20 +397,16 @@ impl SharedFile {
             SLOTS as u32,
         ];
         let head: Vec<u8> = MAGIC.iter().copied().chain(head.into_iter().flat_map(u32::to_le_bytes)).collect();
-        let zeros = vec![0; 1 << 16];
-        for at in (0..bytes).step_by(zeros.len()) {
-            shared.write(at, &zeros[..zeros.len().min(bytes - at)]).map_err(refused)?;
-        }
         shared.write(0, &head).map_err(refused)?;
         Ok(shared)
     }
 
     fn read(&self, at: usize, bytes: &mut [u8]) -> io::Result<()> {
-        std::os::unix::fs::FileExt::read_exact_at(self.file.as_file(), bytes, at as u64)
+        self.mapped.as_volatile_slice().read_slice(bytes, at).map_err(io::Error::other)
     }
 
     fn write(&self, at: usize, bytes: &[u8]) -> io::Result<()> {
-        std::os::unix::fs::FileExt::write_all_at(self.file.as_file(), bytes, at as u64)
+        self.mapped.as_volatile_slice().write_slice(bytes, at).map_err(io::Error::other)
     }
 
     fn unlink(&self) {

@@ -422,13 +422,7 @@ impl Lockstep {
     pub fn begin_reset(&mut self, reset: &Reset) -> Result<(), StepError> {
         let begins = self.begins(reset).map_err(StepError::Refused)?;
         self.has_begun = true;
-        self.slot = (self.slot + 1) % SLOTS;
-        let (mut begins, each, slot) = (begins.into_iter(), self.plan.agents / self.worlds.len(), self.slot);
-        self.expect(self.apart());
-        for world in 0..self.worlds.len() {
-            let begins = begins.by_ref().take(each).collect();
-            self.order(world, Order::Begin { begins, slot });
-        }
+        self.deal(begins, |begins, slot| Order::Begin { begins, slot });
         Ok(())
     }
 
@@ -442,14 +436,18 @@ impl Lockstep {
         let bytes = self.memory.actions().map_err(|error| StepError::Failed(error.to_string()))?;
         let actions = read_actions(self.memory.layout(), &self.plan.space, &bytes)
             .map_err(|(agent, why)| StepError::Refused(Refusal::of_arena(agent / self.plan.per_arena, why)))?;
+        self.deal(actions, |actions, slot| Order::Step { actions, slot });
+        Ok(())
+    }
+
+    /// Gives each World an order for its agents, whose results go to the next slot.
+    fn deal<T>(&mut self, of_agents: Vec<T>, order: impl Fn(Vec<T>, usize) -> Order) {
         self.slot = (self.slot + 1) % SLOTS;
-        let (mut actions, each, slot) = (actions.into_iter(), self.plan.agents / self.worlds.len(), self.slot);
+        let (mut of_agents, each) = (of_agents.into_iter(), self.plan.agents / self.worlds.len());
         self.expect(self.apart());
         for world in 0..self.worlds.len() {
-            let actions = actions.by_ref().take(each).collect();
-            self.order(world, Order::Step { actions, slot });
+            self.order(world, order(of_agents.by_ref().take(each).collect(), self.slot));
         }
-        Ok(())
     }
 
     /// Orders what [`load`](Self::load) does.
