@@ -240,6 +240,8 @@ def slurm_train(folder, playbot, _whole):
     variables = {"PLAYBOT": playbot, "PLAYBOT_PYTHON": sys.executable, "PYTHONPATH": sources, "GAME": GAME, "RUN": "run", "PORT": "6380"}
     variables |= {"SLURM_JOB_NODELIST": "node[0-1]", "SLURM_CPUS_PER_TASK": 1, "TRAIN": f"{settings} 2048"}
     variables["PATH"] = f"{folder / 'bin'}:{os.environ['PATH']}"
+    # Ray's sockets lie there, whose paths must be short; in its usual folder others would look for this cluster.
+    variables["RAY_TMPDIR"] = tempfile.mkdtemp(prefix="pb-")
     done = run(["bash", str(script)], folder, variables)
     check("two nodes train", done.returncode == 0 and b"of 2 workers" in done.stderr)
     again = run(["bash", str(script)], folder, variables)
@@ -247,6 +249,7 @@ def slurm_train(folder, playbot, _whole):
     alone = run([playbot, "train", GAME, *settings.split(), "2048", "--run", "alone"], folder, {})
     same = (folder / "run/metrics.jsonl").read_bytes() == (folder / "alone/metrics.jsonl").read_bytes()
     check("Slurm: the training is that of one process", alone.returncode == 0 and same)
+    shutil.rmtree(variables["RAY_TMPDIR"], ignore_errors=True)
 
 
 def kuberay(folder, playbot, _whole):

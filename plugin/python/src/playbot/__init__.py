@@ -8,6 +8,7 @@ any program with playbot's command line. It runs beside Python, and its arrays l
 - ``playbot.pettingzoo``: games of several agents.
 - ``playbot.minari``: recordings as data sets, and back.
 - ``playbot.sb3``: vectors for Stable-Baselines3.
+- ``playbot.cluster``: workers of trainings and tests on many machines, which the program starts by itself.
 """
 
 import importlib
