@@ -308,3 +308,33 @@ def test_recordings_become_a_data_set_of_minari_and_come_back(tmp_path, monkeypa
             assert (one["actions"], one["rewards"], one["level"]) == (other["actions"], other["rewards"], other["level"])
     with pytest.raises(playbot.PlaybotError, match="the observations of the data set are"):
         from_minari("test/maze2d-v0", tmp_path / "other", game="maze2d-sighted")
+
+
+def test_an_interrupted_step_ends_the_conversation(monkeypatch):
+    with playbot.Client("coinrun", levels="easy:0..9", arenas=2) as client:
+        client.reset(seed=1)
+        exactly = client._exactly
+        monkeypatch.setattr(client, "_exactly", lambda buffer: (_ for _ in ()).throw(KeyboardInterrupt))
+        with pytest.raises(KeyboardInterrupt):
+            client.step(np.zeros(2, np.int32))
+        monkeypatch.setattr(client, "_exactly", exactly)
+        # The answer to that step would be taken for the next one.
+        with pytest.raises(playbot.PlaybotError, match="closed"):
+            client.reset()
+
+
+def test_actions_that_do_not_fit_are_refused_and_not_cut():
+    with playbot.Client("coinrun", levels="easy:0..9", arenas=2) as client:
+        client.reset(seed=1)
+        with pytest.raises(ValueError, match="32 bits"):
+            client.step(np.array([0, 2**32 + 3]))
+
+
+def test_a_program_that_is_none_is_said_and_leaves_nothing(tmp_path):
+    before = left_behind()
+    text = tmp_path / "text"
+    text.write_text("no program")
+    text.chmod(0o755)
+    with pytest.raises(playbot.ProgramEnded, match="cannot be started"):
+        playbot.Client("coinrun", program=str(text))
+    assert left_behind() == before

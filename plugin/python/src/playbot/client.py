@@ -145,6 +145,8 @@ class Client:
         if array.dtype.kind == "i" and actions.dtype.kind not in "iub":
             raise TypeError(f"actions are whole numbers, and these are {actions.dtype}")
         array[...] = actions
+        if actions.dtype.itemsize > 4 and array.dtype.kind == "i" and (array != actions).any():
+            raise ValueError("an action does not fit into 32 bits")
 
     # Other calls.
 
@@ -201,6 +203,8 @@ class Client:
             self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         else:
             host, _, port = address.rpartition(":")
+            if not port.isdigit():
+                raise PlaybotError(f"{address} is no address: write HOST:PORT, or the path of a socket")
             address = (host, int(port))
             self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -254,6 +258,14 @@ class Client:
             raise PlaybotError(f"{place['path']} is not the shared memory of this game")
 
     def _state(self, kind, content):
+        try:
+            return self._answered_state(kind, content)
+        except KeyboardInterrupt:
+            # The answer is still to come, and the next one would be taken for it.
+            self._end()
+            raise
+
+    def _answered_state(self, kind, content):
         self._send(kind, content)
         # A state that lies in shared memory is a message of six bytes.
         head = self._exactly(self._head)
@@ -267,8 +279,12 @@ class Client:
         return self._batches[self._turn]
 
     def _call(self, **call):
-        self._send(_CALL, json.dumps(call).encode())
-        kind, content = self._receive()
+        try:
+            self._send(_CALL, json.dumps(call).encode())
+            kind, content = self._receive()
+        except KeyboardInterrupt:
+            self._end()
+            raise
         return content if kind == _BYTES else json.loads(content)
 
     def _send(self, kind, content=b""):
@@ -366,9 +382,14 @@ class Program:
                 words += [flag, value.lower().replace("_", "-") if name == "autoreset" else value]
         # Other programs of a terminal hear Ctrl-C too: this one ends when its client leaves.
         self._words = tempfile.TemporaryFile()
-        self._process = subprocess.Popen(
-            words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=self._words, start_new_session=True
-        )
+        try:
+            self._process = subprocess.Popen(
+                words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=self._words, start_new_session=True
+            )
+        except OSError as error:
+            self._words.close()
+            self.forget_folder()
+            raise ProgramEnded(f"{path} cannot be started: {error}") from error
         line = self._process.stdout.readline()
         try:
             begun = json.loads(line)

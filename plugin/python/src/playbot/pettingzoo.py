@@ -38,14 +38,18 @@ class Parallel(ParallelEnv):
         return self.action_spaces[agent]
 
     def reset(self, seed=None, options=None):
-        """Begin an episode."""
+        """Begin an episode, on the level of ``options`` if it names one. Others are ignored, as PettingZoo wants it."""
         level = (options or {}).get("level")
         batch = self.client.reset(seed, None if level is None else [level])
         self.agents = list(self.possible_agents)
         return self._of_agents(batch.observations), self._infos(batch)
 
     def step(self, actions):
-        """Play one tick. An agent whose episode is over does nothing."""
+        """Play one tick. An agent whose episode is over needs no action; each other one does."""
+        missing = [agent for agent in self.agents if agent not in actions]
+        if missing:
+            raise ValueError(f"there is no action for {', '.join(missing)}")
+        # Those of the last step, for agents whose episode is over: the game does not look at them.
         rows = {name: array.copy() for name, array in self.client.actions.items()}
         for row, agent in enumerate(self.possible_agents):
             if agent in actions:

@@ -5,7 +5,7 @@ import time
 import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
 
-from playbot.envs import action_space, connect, mask_of, observation_space
+from playbot.envs import action_space, connect_alone, mask_of, observation_space
 
 
 class Vector(VecEnv):
@@ -16,9 +16,9 @@ class Vector(VecEnv):
     """
 
     def __init__(self, game=None, num_envs=64, **options):
-        self.client = connect(game, {"arenas": num_envs, "autoreset": "same_step"}, options)
-        description = self.client.description
         self.render_mode = "rgb_array" if options.get("render") else None
+        self.client = connect_alone(game, {"arenas": num_envs, "autoreset": "same_step"}, options, self.render_mode)
+        description = self.client.description
         super().__init__(num_envs, observation_space(description), action_space(description))
         self._actions = self._levels = self._masks = None
         self._begun = time.monotonic()

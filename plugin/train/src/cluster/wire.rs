@@ -7,9 +7,9 @@
 //! use playbot_train::cluster::wire::{Kind, read_frame, write_frame};
 //!
 //! let mut bytes = Vec::new();
-//! write_frame(&mut bytes, Kind::Lost, 3, &[b"hel", b"lo"])?;
+//! write_frame(&mut bytes, Kind::Lost, 3, &[b"work", b"er 3"])?;
 //! let frame = read_frame(&mut bytes.as_slice())?.expect("a message");
-//! assert_eq!((frame.kind, frame.worker, frame.content.as_slice()), (Kind::Lost, 3, &b"hello"[..]));
+//! assert_eq!((frame.kind, frame.worker, frame.content.as_slice()), (Kind::Lost, 3, &b"worker 3"[..]));
 //! # Ok::<(), std::io::Error>(())
 //! ```
 
