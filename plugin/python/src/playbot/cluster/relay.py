@@ -92,7 +92,7 @@ class Worker:
 
 
 class Relay:
-    def __init__(self, program, workers, out):
+    def __init__(self, program, workers, out, events):
         import ray
 
         self.ray = ray
@@ -102,7 +102,7 @@ class Relay:
         self.actor = ray.remote(num_cpus=1, max_restarts=0)(Worker)
         # Newest setup and weights, which a replacement needs, too.
         self.given = {}
-        self.events = queue.Queue()
+        self.events = events
         # A new number for each actor, so that answers of those that are gone are known.
         self.lives = [0] * workers
         self.actors = [self.new_actor() for _ in range(workers)]
@@ -110,13 +110,7 @@ class Relay:
     def new_actor(self):
         return self.actor.remote(self.program, os.getcwd())
 
-    def run(self, source):
-        def listen():
-            while (message := read(source)) is not None:
-                self.events.put(message)
-            self.events.put(None)
-
-        threading.Thread(target=listen, daemon=True).start()
+    def run(self):
         write(self.out, HELLO, ALL, json.dumps({"protocol": PROTOCOL, "workers": len(self.actors)}).encode())
         while (event := self.events.get()) is not None:
             kind, worker, content = event
@@ -161,7 +155,18 @@ def relay(args):
     # What Ray prints must not come between the messages.
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    source = sys.stdin.buffer
+    source, events, is_there = sys.stdin.buffer, queue.Queue(), threading.Event()
+
+    def listen():
+        while (message := read(source)) is not None:
+            events.put(message)
+        if not is_there.is_set():
+            # The training is gone, and Ray may try to reach a cluster for minutes.
+            os._exit(0)
+        events.put(None)
+
+    threading.Thread(target=listen, daemon=True).start()
+    report("starting Ray, or joining its cluster; that can take half a minute")
     try:
         program = args.program
         if os.sep in program:
@@ -170,7 +175,9 @@ def relay(args):
         workers = args.workers or processors
         if workers > processors:
             report(f"the cluster has {processors} processors for {workers} workers: the others wait until there are more")
-        Relay(program, workers, out).run(source)
+        relayed = Relay(program, workers, out, events)
+        is_there.set()
+        relayed.run()
     except BrokenPipeError:
         # The training is gone.
         return 0
