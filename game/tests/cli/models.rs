@@ -149,7 +149,7 @@ fn what_is_wrong_is_said_with_what_is_right() {
         let answer = client.hear();
         assert_eq!((&answer["id"], &answer["error"]["code"]), (&Value::Null, &json!(number)), "{line}");
     }
-    // Nobody answers a notification.
+    // A notification gets no answer.
     client.say(r#"{"jsonrpc":"2.0","method":"notifications/unknown"}"#);
     for (method, params, number, words) in [
         ("resources/list", json!({}), -32601, "`resources/list`"),

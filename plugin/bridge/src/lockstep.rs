@@ -68,6 +68,9 @@ pub struct Settings<'a> {
     pub seed: u64,
     /// What follows the end of an episode.
     pub autoreset: Autoreset,
+    /// Whether the first agent of each arena is played alone. In a game whose agents share arenas, the others
+    /// [play along](bevy_playbot::engine::PlaysAlong), as in tests and recordings.
+    pub first_seat: bool,
 }
 
 /// The order in which arenas play levels.
@@ -96,14 +99,20 @@ pub enum Autoreset {
 
 impl Settings<'_> {
     fn arrangement(&self) -> Arrangement {
+        if self.first_seat && self.game.tools().host.agents_per_arena() > 1 {
+            return Arrangement { worlds: self.arenas.max(1), arenas: 1 };
+        }
         let agents = self.arenas.max(1).saturating_mul(self.agents_per_arena() as u32);
         // As many threads as divide the arenas, so that there are as many arenas as were asked for.
         let threads = (1..=self.threads.max(1) as u32).rev().find(|threads| self.arenas.is_multiple_of(*threads));
         Arrangement::of_agents(self.game, agents, threads.unwrap_or(1))
     }
 
-    /// Returns the agents that share an arena.
+    /// Returns the agents of an arena that are played.
     pub fn agents_per_arena(&self) -> usize {
+        if self.first_seat {
+            return 1;
+        }
         self.game.tools().host.agents_per_arena().max(1) as usize
     }
 

@@ -22,11 +22,11 @@
 //!     threads: 1,
 //!     seed: 1,
 //!     autoreset: Autoreset::Disabled,
+//!     first_seat: false,
 //! };
 //! let folder = tempfile::tempdir().expect("a folder");
 //! let server = Server {
 //!     settings: &settings,
-//!     first_seat: false,
 //!     bounds: Bounds::default(),
 //!     folder: folder.path(),
 //!     examiner: &NoExaminer,
@@ -65,10 +65,8 @@ use crate::{
     mcp::{
         protocol::Inbox,
         session::{Pause, Session},
-        words::FirstSeat,
     },
 };
-use playbot_harness::game::Game;
 use std::{
     fmt,
     io::{self, Read, Write},
@@ -144,8 +142,6 @@ impl Examiner for NoExaminer {
 pub struct Server<'a> {
     /// What is played: one arena, in which an episode is followed by nothing until the model begins another.
     pub settings: &'a Settings<'a>,
-    /// Whether the first seat of a game of several agents is played alone, while the others play along.
-    pub first_seat: bool,
     /// The bounds.
     pub bounds: Bounds,
     /// The folder of recordings, which is there.
@@ -189,9 +185,7 @@ impl Server<'_> {
     /// The system starts no thread, or a file of the recording cannot be written.
     pub fn run(&self, input: impl Read + Send + 'static, output: &mut dyn Write) -> io::Result<SessionEnd> {
         let inbox = Inbox::of(input)?;
-        let first = FirstSeat(self.settings.game);
-        let game: &dyn Game = if self.first_seat { &first } else { self.settings.game };
-        let settings = Settings { game, arenas: 1, threads: 1, ..self.settings.clone() };
+        let settings = Settings { arenas: 1, threads: 1, ..self.settings.clone() };
         let memory = Arc::new(Memory::of_messages(settings.layout()));
         let mut session = Session::new(self, &settings, memory.clone(), output);
         // Worlds are built for the first call that needs one, and anew after each panic.

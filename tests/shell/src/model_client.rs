@@ -117,7 +117,7 @@ impl ModelClient {
     pub fn to_end(mut self) -> (i32, String) {
         let mut rest = String::new();
         self.output.read_line(&mut rest).expect("readable");
-        assert_eq!(rest, "", "nobody has asked for this");
+        assert_eq!(rest, "", "not asked for");
         let status = self.program.wait().expect("a child");
         (status.code().expect("no signal"), self.errors.to_end())
     }

@@ -22,6 +22,7 @@ fn settings<'a>(game: &'a dyn Game, levels: &str) -> Settings<'a> {
         threads: 1,
         seed: 1,
         autoreset: Autoreset::Disabled,
+        first_seat: false,
     }
 }
 
@@ -33,8 +34,8 @@ fn played(
     examiner: &dyn Examiner,
     calls: &[(&str, Value)],
 ) -> (Vec<Value>, SessionEnd) {
-    let bounds = Bounds::default();
-    let server = Server { settings, first_seat, bounds, folder, examiner, stops: &|| false, report: &|_| {} };
+    let (settings, bounds) = (&Settings { first_seat, ..settings.clone() }, Bounds::default());
+    let server = Server { settings, bounds, folder, examiner, stops: &|| false, report: &|_| {} };
     let greeting =
         json!({ "jsonrpc": "2.0", "id": 0, "method": "initialize", "params": { "protocolVersion": "2025-06-18" } });
     let call = |(at, (name, arguments)): (usize, &(&str, Value))| {

@@ -30,6 +30,7 @@ fn settings(arenas: u32, threads: usize, autoreset: Autoreset) -> Settings<'stat
         threads,
         seed: 1,
         autoreset,
+        first_seat: false,
     }
 }
 

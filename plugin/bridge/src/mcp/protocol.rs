@@ -104,7 +104,7 @@ fn parsed(line: &[u8]) -> Incoming {
     let params = match message.remove("params") {
         None => Map::new(),
         Some(Value::Object(params)) => params,
-        // Nobody waits for an answer to a notification.
+        // A notification gets no answer.
         Some(_) if id.is_none() => return Incoming::Nothing,
         Some(_) => return wrong(known, RpcError::bad_params(format!("the `params` of `{method}` are an object"))),
     };
@@ -160,7 +160,7 @@ impl Inbox {
     }
 }
 
-/// Reads messages until the client is gone, or nobody wants them any more.
+/// Reads messages until the client is gone, or the session is over.
 fn read(input: impl Read, messages: &SyncSender<Incoming>, cancelled: &Mutex<Vec<Value>>) {
     let mut input = BufReader::new(input);
     let mut line = Vec::new();

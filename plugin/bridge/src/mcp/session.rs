@@ -116,7 +116,7 @@ impl<'a> Session<'a> {
         output: &'a mut dyn Write,
     ) -> Self {
         let (game, mode) = (settings.game, settings.levels.mode.as_str());
-        let words = Words::of(game, seats(game, mode));
+        let words = Words::of(game, seats(game, mode, settings.agents_per_arena() as u32));
         let mut records = Records::new(server.folder, game.demo_header(mode));
         records.of_client(CLIENT);
         Self {
@@ -173,7 +173,7 @@ impl<'a> Session<'a> {
                 Handled::Answered(answered) => (answered, false),
                 Handled::Broken(answered) => (Ok(answered), true),
             };
-            // Nobody waits for the answer to a cancelled request.
+            // A cancelled request gets no answer.
             let is_sent = inbox.is_cancelled(&request.id) || answer(self.output, &request.id, answered).is_ok();
             if is_broken {
                 return Pause::Broken;

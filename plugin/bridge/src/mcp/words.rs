@@ -8,20 +8,16 @@ use bevy::prelude::*;
 use bevy_playbot::{
     action::{ActionSpace, ActionValue, MixedSpace},
     engine::misfit,
-    headless::HeadlessPlugins,
-    observation::ObservationSpace,
-    placement::TickPlacement,
     unknown_name::UnknownName,
     vision::ImageOptions,
 };
 use playbot_harness::{
-    game::{Game, GameTools, HostTools, idle_action},
+    game::{Game, idle_action},
     worlds::build_world,
 };
 use playbot_learner::EntitySet;
 use png::{BitDepth, ColorType, Encoder, EncodingError};
 use serde_json::{Map, Value, json};
-use std::sync::Arc;
 
 /// The names of actions and of observed values.
 #[derive(Debug)]
@@ -330,13 +326,12 @@ pub(super) fn png(image: &ImageOptions, planes: &[u8]) -> Result<Vec<u8>, Encodi
     Ok(bytes)
 }
 
-// Seats of a game of several agents: all of them for the model, or the first one alone.
+// Seats of a game of several agents.
 
-/// Returns the seats that a model plays, in the order in which a World has their agents.
-pub(super) fn seats(game: &dyn Game, mode: &str) -> Vec<Seat> {
+/// Returns the seats of the `count` agents of an arena that a model plays, in the order in which a World has them.
+pub(super) fn seats(game: &dyn Game, mode: &str, count: u32) -> Vec<Seat> {
     let tools = game.tools();
     let (host, names) = (tools.host, tools.host.seats());
-    let count = host.agents_per_arena().max(1);
     if count == 1 || names.is_empty() {
         let actions = tools.input.action_names();
         let name = |number: u32| (count > 1).then(|| number.to_string());
@@ -351,84 +346,6 @@ pub(super) fn seats(game: &dyn Game, mode: &str) -> Vec<Seat> {
         Seat { name: Some(names.get(seat).cloned().unwrap_or_else(|| at.to_string())), actions }
     };
     agents.iter().enumerate().map(seat).collect()
-}
-
-/// A game of several agents whose first one is played alone, while the others [play along](bevy_playbot::engine::PlaysAlong), as in tests and
-/// recordings.
-pub(super) struct FirstSeat<'a>(pub(super) &'a dyn Game);
-
-impl Game for FirstSeat<'_> {
-    fn name(&self) -> &'static str {
-        self.0.name()
-    }
-
-    fn version(&self) -> u32 {
-        self.0.version()
-    }
-
-    fn modes(&self) -> &'static [&'static str] {
-        self.0.modes()
-    }
-
-    fn tick_hz(&self) -> f64 {
-        self.0.tick_hz()
-    }
-
-    fn actions(&self) -> ActionSpace {
-        self.0.actions()
-    }
-
-    fn observation(&self) -> ObservationSpace {
-        self.0.observation()
-    }
-
-    fn build(&self, app: &mut App, mode: &str) {
-        self.0.build(app, mode);
-    }
-
-    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
-        self.0.spawn_agent(world, index)
-    }
-
-    fn aliases(&self) -> &'static [&'static str] {
-        self.0.aliases()
-    }
-
-    fn tools(&self) -> GameTools<'_> {
-        GameTools { host: self, ..self.0.tools() }
-    }
-
-    fn built_anew(&self) -> Option<Arc<dyn Game>> {
-        self.0.built_anew()
-    }
-}
-
-impl HostTools for FirstSeat<'_> {
-    fn placement(&self) -> TickPlacement {
-        self.0.tools().host.placement()
-    }
-
-    fn headless_plugins(&self, plugins: HeadlessPlugins) -> bevy::app::PluginGroupBuilder {
-        self.0.tools().host.headless_plugins(plugins)
-    }
-
-    /// As many agents as a World may have: those that play along count, too.
-    fn arenas_per_world(&self) -> Option<u32> {
-        let host = self.0.tools().host;
-        host.arenas_per_world().map(|arenas| arenas.saturating_mul(host.agents_per_arena().max(1)))
-    }
-
-    fn add_agents_along(&self, world: &mut World) {
-        self.0.tools().host.add_agents_along(world);
-    }
-
-    fn time_limit(&self) -> Option<u32> {
-        self.0.tools().host.time_limit()
-    }
-
-    fn unplayable(&self) -> Option<String> {
-        self.0.tools().host.unplayable()
-    }
 }
 
 #[cfg(test)]

@@ -199,6 +199,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
             After::SameStep => Autoreset::SameStep,
             After::Disabled => Autoreset::Disabled,
         },
+        first_seat: args.model.first_seat,
     };
     settings.check_memory()?;
     if args.model.mcp {

@@ -46,7 +46,7 @@ pub(super) struct ModelArgs {
     /// In a game of several agents, play the first one alone, while the others play along as in tests. Only then recordings
     /// replay, and detectors look.
     #[arg(long, requires = "mcp")]
-    first_seat: bool,
+    pub(super) first_seat: bool,
     /// Folder for the recording and the findings of the session, which is new or empty (default: runs/mcp, or with the next
     /// free number).
     #[arg(long, requires = "mcp", value_name = "DIR")]
@@ -91,7 +91,6 @@ pub(super) fn run(args: &ModelArgs, settings: &Settings<'_>) -> Result<Outcome, 
     report!("a model's client speaks over standard input and output; the session is recorded in {}", folder.display());
     let server = Server {
         settings,
-        first_seat: args.first_seat,
         bounds: Bounds {
             ticks: args.max_steps,
             time: Duration::from_secs(args.max_seconds),
