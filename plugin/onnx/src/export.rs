@@ -134,6 +134,7 @@ fn policy_graph(form: &PolicyForm) -> Result<Vec<u8>, OnnxError> {
     let features = net.hidden(&mut graph, "actor", &shape.actor.net, &x)?;
     let head = net.linear(&mut graph, "actor.head", &features)?;
     let (options, numbers) = (space.options(), space.numbers());
+    let is_one = matches!(space, playbot_learner::ActionSpace::Discrete(_));
     let mut choices = None;
     if options > 0 {
         let (mut log_probs, mut taken) = (Vec::new(), Vec::new());
@@ -142,18 +143,12 @@ fn policy_graph(form: &PolicyForm) -> Result<Vec<u8>, OnnxError> {
             let is_all = range.len() == space.dim();
             let logits = if is_all { head.clone() } else { graph.slice(&head, 1, range.start, range.end) };
             let log_prob = graph.node("LogSoftmax", &[&logits], &[Attribute::Int("axis", 1)]);
-            let keep =
-                i64::from(ranges.len() > 1 || numbers > 0 || matches!(space, playbot_learner::ActionSpace::Mixed(_)));
-            taken.push(graph.node(
-                "ArgMax",
-                &[&log_prob],
-                &[Attribute::Int("axis", 1), Attribute::Int("keepdims", keep)],
-            ));
+            let keep = Attribute::Int("keepdims", i64::from(!is_one));
+            taken.push(graph.node("ArgMax", &[&log_prob], &[Attribute::Int("axis", 1), keep]));
             log_probs.push(log_prob);
         }
         choices = Some((graph.concat(&taken, 1), graph.concat(&log_probs, 1), ranges.len()));
     }
-    let is_one = matches!(space, playbot_learner::ActionSpace::Discrete(_));
     let of_choices = |graph: &mut Graph, ports: &mut Ports, name: &str| {
         if let Some((taken, log_probs, count)) = &choices {
             let (sizes, doc) = match is_one {

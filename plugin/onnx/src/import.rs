@@ -390,10 +390,7 @@ impl ImportedPolicy {
     pub fn compare<'a>(&self, obs: impl Into<ObsSlice<'a>>, n: usize) -> Result<f64, OnnxError> {
         let (policy, obs) = (&self.file.policy, obs.into());
         let width = policy.obs_dim();
-        let found = match obs {
-            ObsSlice::Vector(values) => values.len(),
-            ObsSlice::Image(bytes) => bytes.len(),
-        };
+        let found = obs.numbers();
         if found != n * width {
             return Err(OnnxError::Misfit(format!(
                 "{n} observations of the policy have {} numbers, not {found}",
@@ -406,10 +403,7 @@ impl ImportedPolicy {
             if row.is_multiple_of(TICKS) {
                 (state, memory) = (None, Vec::new());
             }
-            let one = match obs {
-                ObsSlice::Vector(values) => ObsSlice::Vector(&values[row * width..(row + 1) * width]),
-                ObsSlice::Image(bytes) => ObsSlice::Image(&bytes[row * width..(row + 1) * width]),
-            };
+            let one = obs.rows(row..row + 1, width);
             let (head, spread, after) = self.source.distribution(one, state.as_ref())?;
             let output = policy.forward_remembering(&[], &[], &memory, one, 1)?;
             let none = Vec::new();
