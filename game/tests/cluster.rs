@@ -31,14 +31,14 @@ fn same_with_workers(folder: &Path, settings: &[&str]) {
     }
 }
 
-const SMALL: [&str; 4] = ["coinrun", "--algorithm", "ppo", "--set"];
+const SMALL: [&str; 3] = ["coinrun", "--algorithm", "ppo"];
 
 #[test]
 fn each_number_of_workers_comes_to_the_same_bytes() {
     let folder = tempfile::tempdir().expect("a folder");
     let plr = "train=hard:0..7,test=hard:64..71,arenas=8,worlds=2,steps=2048,ppo.num_steps=32,ppo.hidden=[16],\
                ppo.memory=Gru(hidden: 8),ppo.norm_obs=true,levels.order=Plr()";
-    same_with_workers(folder.path(), &settings(&SMALL[..3], plr));
+    same_with_workers(folder.path(), &settings(&SMALL, plr));
 }
 
 /// Returns the words of a training with these settings.
@@ -99,7 +99,7 @@ fn workers_of(training: u32) -> Vec<u32> {
 fn a_worker_that_is_killed_is_replaced_and_changes_nothing() {
     let folder = tempfile::tempdir().expect("a folder");
     let sets = "train=hard:0..7,test=hard:64..71,arenas=8,worlds=2,steps=40960,ppo.num_steps=64,ppo.hidden=[32]";
-    let words = settings(&SMALL[..3], sets);
+    let words = settings(&SMALL, sets);
     train(folder.path(), "whole", &words, &[]);
     let run = folder.path().join("killed");
     let cluster = ["train", "--run", "killed", "--cluster", "processes", "--workers", "3"];
@@ -127,7 +127,7 @@ fn a_worker_that_is_killed_is_replaced_and_changes_nothing() {
 fn a_training_goes_on_with_workers_or_without() {
     let folder = tempfile::tempdir().expect("a folder");
     let sets = "train=hard:0..7,test=hard:64..71,arenas=8,worlds=2,ppo.num_steps=32,ppo.hidden=[16]";
-    let words = settings(&SMALL[..3], sets);
+    let words = settings(&SMALL, sets);
     train(folder.path(), "whole", &[&words[..], &["--steps", "1024"]].concat(), &[]);
     train(
         folder.path(),

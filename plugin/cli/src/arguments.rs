@@ -164,6 +164,16 @@ pub(crate) fn revision() -> &'static str {
     env!("PLAYBOT_REVISION")
 }
 
+/// Returns the version of playbot that trained something. A game's own version stands elsewhere.
+pub(crate) fn code(version: &str, revision: &str) -> String {
+    format!("playbot {version} ({revision})")
+}
+
+/// Returns the version of playbot that runs.
+pub(crate) fn own_code() -> String {
+    code(env!("CARGO_PKG_VERSION"), revision())
+}
+
 /// Parses a number of steps, also as `1_000_000`, `1e6` or `2.5e6`.
 ///
 /// # Errors

@@ -130,6 +130,33 @@ pub struct CrewPlan {
     pub python: PathBuf,
 }
 
+impl CrewPlan {
+    /// Returns the call of a verb of `playbot.cluster`, with all that it needs to know of the workers.
+    pub fn by_ray(&self, verb: &str) -> Command {
+        let mut command = Command::new(&self.python);
+        command.args(["-m", "playbot.cluster", verb, "--program"]).arg(&self.program);
+        if let Address::Ray(Some(address)) = &self.address {
+            command.args(["--address", address]);
+        }
+        command.args(self.workers.iter().flat_map(|workers| ["--workers".to_owned(), workers.to_string()]));
+        command
+    }
+
+    /// Returns the error about a command that the system does not start.
+    pub fn not_started(&self, command: &Command, source: io::Error) -> ClusterError {
+        ClusterError::Start {
+            program: command.get_program().to_string_lossy().into_owned(),
+            source,
+            advice: match self.address {
+                Address::Processes => "the program of the workers is this one, unless --worker-program names another",
+                Address::Ray(_) => {
+                    "Ray is reached through Python: install `playbot[ray]`, and name it in PLAYBOT_PYTHON"
+                }
+            },
+        }
+    }
+}
+
 /// Bytes between a training and its workers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Traffic {
@@ -146,7 +173,7 @@ pub struct Traffic {
 /// Workers that play for a training. They end when it is dropped.
 pub struct Crew {
     plan: CrewPlan,
-    setup: Vec<u8>,
+    setup: Arc<Vec<u8>>,
     /// The newest weights, with their number.
     weights: Arc<Vec<u8>>,
     pipes: Vec<Pipe>,
@@ -188,7 +215,8 @@ impl Crew {
     /// [`ClusterError`] if they cannot be started.
     pub fn open(plan: CrewPlan, setup: &Setup) -> Result<Self, ClusterError> {
         let (sender, events) = channel();
-        let setup = serde_json::to_vec(setup).map_err(|error| ClusterError::Weights(error.to_string()))?;
+        // Texts and numbers are always JSON.
+        let setup = Arc::new(serde_json::to_vec(setup).unwrap_or_default());
         let processors = thread::available_parallelism().map_or(1, usize::from);
         let workers = plan.workers.unwrap_or(processors).max(1);
         let (weights, traffic) = (Arc::default(), Traffic::default());
@@ -201,9 +229,8 @@ impl Crew {
                 crew.workers = crew.hello()?;
             }
         }
-        let setup = std::mem::take(&mut crew.setup);
+        let setup = crew.setup.clone();
         crew.send_all(Kind::Setup, &setup);
-        crew.setup = setup;
         Ok(crew)
     }
 
@@ -224,34 +251,17 @@ impl Crew {
     /// Starts a process, and a thread that reads from it.
     fn start(&mut self) -> Result<Pipe, ClusterError> {
         let mut command = match &self.plan.address {
-            Address::Processes => {
-                let mut command = Command::new(&self.plan.program);
-                command.arg("work");
-                command
-            }
-            Address::Ray(address) => {
-                let mut command = Command::new(&self.plan.python);
-                command.args(["-m", "playbot.cluster", "relay", "--program"]).arg(&self.plan.program);
-                command.args(address.iter().flat_map(|address| ["--address", address]));
-                command
-                    .args(self.plan.workers.iter().flat_map(|workers| ["--workers".to_owned(), workers.to_string()]));
-                command
-            }
+            Address::Processes => Command::new(&self.plan.program),
+            Address::Ray(_) => self.plan.by_ray("relay"),
         };
+        if !self.is_relayed() {
+            command.arg("work");
+        }
         command.stdin(Stdio::piped()).stdout(Stdio::piped());
         // Ctrl-C is for the training, which then ends its workers.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
-        let mut child = command.spawn().map_err(|source| ClusterError::Start {
-            program: command.get_program().to_string_lossy().into_owned(),
-            source,
-            advice: match self.plan.address {
-                Address::Processes => "the program of the workers is this one, unless --worker-program names another",
-                Address::Ray(_) => {
-                    "Ray is reached through Python: install `playbot[ray]`, and name it in PLAYBOT_PYTHON"
-                }
-            },
-        })?;
+        let mut child = command.spawn().map_err(|source| self.plan.not_started(&command, source))?;
         self.started += 1;
         let number = self.started;
         let (input, output, events) = (child.stdin.take(), child.stdout.take(), self.sender.clone());
@@ -358,9 +368,8 @@ impl Crew {
     fn replace(&mut self, pipe: usize) -> Result<(), ClusterError> {
         self.traffic.lost += 1;
         self.pipes[pipe] = self.start()?;
-        let (setup, weights) = (std::mem::take(&mut self.setup), self.weights.clone());
+        let (setup, weights) = (self.setup.clone(), self.weights.clone());
         self.send(pipe, Kind::Setup, pipe as u32, &setup);
-        self.setup = setup;
         self.send(pipe, Kind::Weights, pipe as u32, &weights);
         Ok(())
     }

@@ -328,9 +328,7 @@ impl Trainer {
         let mut obs = std::mem::replace(&mut self.obs, Observations::empty(&self.obs_kind));
         if self.away.is_some() {
             let (shares, collected) = self.collect_away(policy, latent, steps, &mut obs)?;
-            let played = start.elapsed();
-            self.note_played(played);
-            return self.joined(obs, shares, collected, played, Duration::ZERO);
+            return self.joined(obs, shares, collected, start.elapsed(), Duration::ZERO);
         }
         let shares: Vec<usize> = self.collectors.iter().map(|collector| collector.agents().len()).collect();
         let columns = obs.columns(&self.obs_kind, steps, &shares);

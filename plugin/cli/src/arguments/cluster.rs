@@ -1,6 +1,6 @@
 //! Options of verbs whose work other processes and machines can do.
 
-use crate::{arguments::revision, error::CliError};
+use crate::{arguments::own_code, error::CliError};
 use playbot_harness::game::Game;
 use playbot_report::{counted, whole};
 use playbot_train::{
@@ -8,12 +8,7 @@ use playbot_train::{
     cluster::{Address, Crew, CrewPlan, wire},
     trainer::ClusterReport,
 };
-use std::{
-    env,
-    ffi::OsString,
-    path::PathBuf,
-    process::{Command, Stdio},
-};
+use std::{env, ffi::OsString, path::PathBuf, process::Stdio};
 
 /// Workers of a cluster.
 #[derive(clap::Args, Clone, Debug)]
@@ -31,9 +26,15 @@ pub struct ClusterArgs {
 }
 
 impl ClusterArgs {
-    fn program(&self) -> Result<PathBuf, CliError> {
+    /// Returns the workers to start.
+    fn plan(&self, address: Address) -> Result<CrewPlan, CliError> {
         let own = || env::current_exe().map_err(|error| CliError::Io(format!("this program cannot be found: {error}")));
-        self.worker_program.clone().map_or_else(own, Ok)
+        Ok(CrewPlan {
+            address,
+            workers: self.workers.map(|workers| workers as usize),
+            program: self.worker_program.clone().map_or_else(own, Ok)?,
+            python: env::var_os("PLAYBOT_PYTHON").map_or_else(|| "python3".into(), PathBuf::from),
+        })
     }
 
     /// Starts the workers of a training, if any are asked for.
@@ -45,13 +46,11 @@ impl ClusterArgs {
         let Some(address) = self.cluster.clone() else { return Ok(None) };
         let setup = wire::Setup {
             protocol: wire::PROTOCOL,
-            code: code(),
+            code: own_code(),
             game_version: game.version(),
             experiment: experiment.to_ron().map_err(|error| CliError::Io(error.to_string()))?,
         };
-        let workers = self.workers.map(|workers| workers as usize);
-        let plan = CrewPlan { address, workers, program: self.program()?, python: python() };
-        Ok(Some(Crew::open(plan, &setup)?))
+        Ok(Some(Crew::open(self.plan(address)?, &setup)?))
     }
 
     /// Runs `verb` of the module `playbot.cluster` with these words behind the cluster's, and returns its exit code.
@@ -62,35 +61,18 @@ impl ClusterArgs {
     pub(crate) fn run_by_ray(&self, verb: &str, words: Vec<OsString>) -> Result<Option<i32>, CliError> {
         let address = match &self.cluster {
             None => return Ok(None),
-            Some(Address::Ray(address)) => address.clone(),
+            Some(address @ Address::Ray(_)) => address.clone(),
             Some(Address::Processes) => {
                 let words = "on one machine threads do it: use --threads, or name a cluster with --cluster ray";
                 return Err(CliError::Usage(words.to_owned()));
             }
         };
-        let mut command = Command::new(python());
-        command.args(["-m", "playbot.cluster", verb, "--program"]).arg(self.program()?);
-        command.args(address.iter().flat_map(|address| ["--address", address]));
-        command.args(self.workers.iter().flat_map(|workers| ["--workers".to_owned(), workers.to_string()]));
-        let status = command.args(words).stdin(Stdio::null()).status().map_err(|error| {
-            let python = command.get_program().to_string_lossy().into_owned();
-            CliError::Usage(format!(
-                "`{python}` cannot be started ({error}): Ray is reached through Python; install `playbot[ray]`, and name it in \
-                 PLAYBOT_PYTHON"
-            ))
-        })?;
+        let plan = self.plan(address)?;
+        let mut command = plan.by_ray(verb);
+        let status = command.args(words).stdin(Stdio::null()).status();
+        let status = status.map_err(|error| CliError::Usage(plan.not_started(&command, error).to_string()))?;
         Ok(Some(status.code().unwrap_or(2)))
     }
-}
-
-/// Returns the version of the code that a training and its workers have in common.
-pub(crate) fn code() -> String {
-    format!("playbot {} ({})", env!("CARGO_PKG_VERSION"), revision())
-}
-
-/// Returns the Python that has the package `playbot`.
-fn python() -> PathBuf {
-    env::var_os("PLAYBOT_PYTHON").map_or_else(|| "python3".into(), PathBuf::from)
 }
 
 /// Reports what workers have done, and how long it took.

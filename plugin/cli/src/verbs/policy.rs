@@ -2,9 +2,9 @@
 
 use crate::{
     arguments::{
-        Device,
+        Device, code,
         experiment::{ExperimentArgs, quoted},
-        open,
+        open, own_code,
         player::{check_run_of, check_skills, seen_by_run},
     },
     error::{CliError, Outcome},
@@ -229,7 +229,7 @@ fn import(args: &Import, games: &Games) -> Result<Outcome, CliError> {
     let config = experiment.observation_config();
     config.check(game)?;
     experiment.check_train(game)?;
-    let about = Provenance { code: code(env!("CARGO_PKG_VERSION"), env!("PLAYBOT_REVISION")), ..Provenance::default() };
+    let about = Provenance { code: own_code(), ..Provenance::default() };
     let target = ImportTarget {
         observation: config.obs_kind(game),
         action_space: game.actions(),
@@ -320,7 +320,7 @@ fn from_skills<'a>(path: &Path, from: &ExperimentArgs, games: &'a Games) -> Resu
     let experiment = from.load(games, [])?;
     let game = from.find_game(games, &experiment)?;
     let model = open::skills(path, DeviceKind::default(), from)?;
-    let code = code(env!("CARGO_PKG_VERSION"), env!("PLAYBOT_REVISION"));
+    let code = own_code();
     let training = match (model.demos(), &experiment.demos) {
         (Some(seen), _) => format!("demonstrations of {seen}"),
         (None, Some(demos)) => format!("demonstrations in {}", demos.display()),
@@ -337,11 +337,6 @@ fn from_skills<'a>(path: &Path, from: &ExperimentArgs, games: &'a Games) -> Resu
         about,
     );
     Ok(PolicySource { game, experiment, file })
-}
-
-/// Returns the version of playbot that trained a policy. The game's own version stands elsewhere in the metadata.
-fn code(version: &str, revision: &str) -> String {
-    format!("playbot {version} ({revision})")
 }
 
 fn show(path: &Path, device: DeviceKind, as_json: bool, games: &Games) -> Result<Outcome, CliError> {

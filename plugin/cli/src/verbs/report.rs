@@ -6,12 +6,12 @@ use crate::{
     output,
     output::{print_line, print_table},
     pictures::plot::PlotFile,
-    verbs::test::{Results, report_results, write_page},
+    verbs::test::{Results, join_shards, write_page},
 };
 use playbot_harness::{games::Games, parallel::default_threads};
 use playbot_mutation::calibration::{Calibration, CalibrationError};
 use playbot_test::{
-    verdict::{Comparison, IssueForm, RESULTS, ResultLines, TestRecord, issues, merge, results_folder},
+    verdict::{Comparison, IssueForm, RESULTS, ResultLines, TestRecord, issues, results_folder},
     verdict_report::{REPORT, without_pictures},
 };
 use std::{fs, path::PathBuf};
@@ -96,10 +96,7 @@ pub(crate) fn run_merge(args: &MergeArgs, games: &Games) -> Result<Outcome, CliE
     if let Some(before) = results.against {
         Comparison::check(before, &record)?;
     }
-    merge(&shards, &args.out).map_err(|error| {
-        output::with_advice(error, "the shards are unchanged: make room or rights there and call this again")
-    })?;
-    report_results(&results)
+    join_shards(&shards, &results)
 }
 
 /// Checks that the joined results do not replace needed files.

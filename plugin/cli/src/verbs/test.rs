@@ -48,8 +48,8 @@ pub(crate) use crate::verbs::test::{
     testers::TesterArgs,
 };
 
-pub(crate) use crate::verbs::test::results::write_page;
 pub use crate::verbs::test::results::{Results, report_results};
+pub(crate) use crate::verbs::test::results::{join_shards, write_page};
 
 /// Test levels: report which of them bots and policies solve, and which are unsolvable.
 ///

@@ -1,7 +1,7 @@
 //! `playbot work`.
 
 use crate::{
-    arguments::cluster::code,
+    arguments::own_code,
     error::{CliError, Outcome},
     output::DataStream,
     progress::interrupt,
@@ -28,7 +28,7 @@ pub(crate) fn run(_: &Args, games: &Games) -> Result<Outcome, CliError> {
     interrupt::leave("the training goes on with other workers".to_owned());
     let find = |name: &str| -> Result<&dyn Game, String> { games.get(name).map_err(|error| error.to_string()) };
     let (mut input, mut output) = (BufReader::new(io::stdin().lock()), BufWriter::new(DataStream));
-    let worked = worker::work(&find, &code(), &mut input, &mut output);
+    let worked = worker::work(&find, &own_code(), &mut input, &mut output);
     worked
         .map(|()| Outcome::Pass)
         .map_err(|error| CliError::Io(format!("the training cannot be heard any more: {error}")))

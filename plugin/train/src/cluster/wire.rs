@@ -70,6 +70,9 @@ pub struct Frame {
     pub content: Vec<u8>,
 }
 
+/// Bytes of a message's length.
+const LENGTH: usize = 4;
+
 /// Bytes between length and content.
 const HEAD: usize = 5;
 
@@ -94,33 +97,26 @@ pub fn write_frame(stream: &mut impl Write, kind: Kind, worker: u32, parts: &[&[
 ///
 /// The other side has left within a message, or this is none.
 pub fn read_frame(stream: &mut impl Read) -> io::Result<Option<Frame>> {
-    let mut length = [0; 4];
-    let mut got = 0;
-    while got < length.len() {
-        match stream.read(&mut length[got..]) {
-            Ok(0) if got == 0 => return Ok(None),
-            Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
-            Ok(bytes) => got += bytes,
-            Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            Err(error) => return Err(error),
-        }
-    }
-    let mut head = [0; HEAD];
-    stream.read_exact(&mut head)?;
-    let length = u32::from_le_bytes(length) as usize;
-    let kind = Kind::of(head[0]).filter(|_| length >= HEAD);
+    let head = up_to(stream, LENGTH + HEAD)?;
+    let [l0, l1, l2, l3, kind, w0, w1, w2, w3] = head[..] else {
+        return if head.is_empty() { Ok(None) } else { Err(ErrorKind::UnexpectedEof.into()) };
+    };
+    let length = u32::from_le_bytes([l0, l1, l2, l3]) as usize;
+    let kind = Kind::of(kind).filter(|_| length >= HEAD);
     let kind =
         kind.ok_or_else(|| io::Error::new(ErrorKind::InvalidData, "this is no message of a training or worker"))?;
-    let worker = u32::from_le_bytes([head[1], head[2], head[3], head[4]]);
-    // A wrong length is noticed by the end, before memory for all of it is taken.
-    let mut content = Vec::new();
-    let wanted = length - HEAD;
-    stream.take(wanted as u64).read_to_end(&mut content)?;
-    if content.len() < wanted {
-        Err(ErrorKind::UnexpectedEof.into())
-    } else {
-        Ok(Some(Frame { kind, worker, content }))
+    let content = up_to(stream, length - HEAD)?;
+    if content.len() < length - HEAD {
+        return Err(ErrorKind::UnexpectedEof.into());
     }
+    Ok(Some(Frame { kind, worker: u32::from_le_bytes([w0, w1, w2, w3]), content }))
+}
+
+/// Reads so many bytes, or fewer at the end. Memory is taken for those that come: a wrong length may ask for any number.
+fn up_to(stream: &mut impl Read, bytes: usize) -> io::Result<Vec<u8>> {
+    let mut read = Vec::new();
+    stream.take(bytes as u64).read_to_end(&mut read)?;
+    Ok(read)
 }
 
 /// The first message of a relay.

@@ -16,7 +16,11 @@ use playbot_learner::{
     ActionSpace, LearnError, ObsColumns, ObsKind, Observations, Policy, PolicyFile, PolicyMetadata, Rollout,
     SkillSource,
 };
-use std::{fs, ops::Range, time::Duration};
+use std::{
+    fs,
+    ops::Range,
+    time::{Duration, Instant},
+};
 
 /// Losses of a worker without an answer between them, after which a training ends.
 const MOST_LOSSES: u32 = 5;
@@ -141,6 +145,7 @@ impl Trainer {
     ) -> Result<(Vec<usize>, Vec<OfWorld>), TrainError> {
         let (skills, plan, kind) = (self.learner.skills(), self.plan.state(), self.obs_kind);
         let Some(away) = &mut self.away else { return Ok(Default::default()) };
+        let begun = Instant::now();
         let weights = away.weights(policy, skills, &kind)?;
         away.crew.give_weights(away.rollouts, &weights);
         let shares: Vec<usize> = away.shares.iter().map(|share| share.count as usize).collect();
@@ -168,6 +173,7 @@ impl Trainer {
             }
         }
         away.rollouts += 1;
+        away.played += begun.elapsed();
         Ok((shares, answers.into_iter().flatten().collect()))
     }
 
@@ -175,13 +181,6 @@ impl Trainer {
     pub(super) fn states_away(&self) -> Option<Vec<ArenaState>> {
         let away = self.away.as_ref()?;
         Some(away.shares.iter().flat_map(|share| share.states.iter().cloned()).collect())
-    }
-
-    /// Notes the time in which a rollout was played elsewhere.
-    pub(super) fn note_played(&mut self, played: Duration) {
-        if let Some(away) = &mut self.away {
-            away.played += played;
-        }
     }
 }
 

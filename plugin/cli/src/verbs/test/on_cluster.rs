@@ -2,17 +2,16 @@
 
 use crate::{
     error::{CliError, Outcome},
-    output::with_advice,
     verbs::{
         history::{add_results, check_history},
         test::{
             Args,
-            results::{Results, report_results},
+            results::{Results, join_shards},
         },
     },
 };
 use playbot_learner::disk;
-use playbot_test::verdict::{RESULTS, TestPlan, merge};
+use playbot_test::verdict::{RESULTS, TestPlan};
 use std::{
     env,
     ffi::{OsStr, OsString},
@@ -65,10 +64,7 @@ pub(super) fn run(args: &Args, plan: &TestPlan, results: &Results<'_>) -> Result
         }
     }
     let folders: Vec<PathBuf> = (0..count).map(|shard| shards.join(shard.to_string())).collect();
-    merge(&folders, out).map_err(|error| {
-        with_advice(error, "the shards are unchanged: make room or rights there and call this again")
-    })?;
-    let outcome = report_results(results)?;
+    let outcome = join_shards(&folders, results)?;
     if let (Some(file), Some(game)) = (&args.history, results.game) {
         add_results(file, out, game, args.build.as_deref())?;
     }

@@ -14,12 +14,16 @@ use playbot_test::{
     findings::{FINDINGS, Pins, list_findings},
     verdict::{
         AGAINST, Comparison, JUNIT, LevelVerdict, MOST_WORST, Overview, RESULTS, RecordedTotal, ResultLines, SUMMARY,
-        TestError, TesterTotal, Trials, action_search, comparable_command, missing_failure, report_date, wilson,
+        TestError, TesterTotal, Trials, action_search, comparable_command, merge, missing_failure, report_date, wilson,
         write_reports,
     },
     verdict_report::{HtmlReport, LevelExplorer, REPORT, folder_of, write_html},
 };
-use std::{cell::OnceCell, fs, path::Path};
+use std::{
+    cell::OnceCell,
+    fs,
+    path::{Path, PathBuf},
+};
 
 /// Most findings whose replay command is printed.
 const MOST_REPLAYS: usize = 3;
@@ -67,6 +71,14 @@ impl Results<'_> {
             _ => Ok(()),
         }
     }
+}
+
+/// Joins the results of all shards into the folder of `results`, and reports them.
+pub(crate) fn join_shards(shards: &[PathBuf], results: &Results<'_>) -> Result<Outcome, CliError> {
+    merge(shards, results.folder).map_err(|error| {
+        output::with_advice(error, "the shards are unchanged: make room or rights there and call this again")
+    })?;
+    report_results(results)
 }
 
 /// Compares results if requested, writes the files that go with them, and prints them. The outcome is that of the

@@ -7,7 +7,6 @@ the worker, 32 bits; its content. The lowest byte comes first.
 import collections
 import json
 import os
-import pathlib
 import queue
 import re
 import struct
@@ -168,14 +167,11 @@ def relay(args):
     threading.Thread(target=listen, daemon=True).start()
     report("starting Ray, or joining its cluster; that can take half a minute")
     try:
-        program = args.program
-        if os.sep in program:
-            program = str(pathlib.Path(program).absolute())
         processors = start(args.address, args.workers)
         workers = args.workers or processors
         if workers > processors:
             report(f"the cluster has {processors} processors for {workers} workers: the others wait until there are more")
-        relayed = Relay(program, workers, out, events)
+        relayed = Relay(args.program, workers, out, events)
         is_there.set()
         relayed.run()
     except BrokenPipeError:
